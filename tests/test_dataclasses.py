@@ -72,6 +72,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "_Pose",
         "InitialState",
         "FurtherColumns",
+        "WienerFilter",
         "_Courses",
         "_Products",
         "_InNoise",

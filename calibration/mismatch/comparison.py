@@ -43,6 +43,7 @@ from regolithd.calibration.mismatch.inference.joint_parameters import informatio
 from regolithd.calibration.mismatch.inference.opposite_sign import notes_on_opposite_sign
 from regolithd.calibration.mismatch.inference.parameter_information import drawn_for
 from regolithd.calibration.mismatch.inference.same_parameters import with_changes_beside_same_parameters
+from regolithd.calibration.mismatch.inference.shown_direction import notes_on_shown_direction
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
@@ -201,6 +202,7 @@ def decided(
         *notes_of_feedback(decision.equations.problem),
         *notes_on_held_inputs(recorded, decision.late_inputs, simulation.between_readings),
         *notes_on_opposite_sign(decision),
+        *notes_on_shown_direction(decision),
     )
     return replace(found, decision=replace(decision, notes=(*decision.notes, *notes)))
 

@@ -48,8 +48,8 @@ class Columns(dict[str, Array]):
     def missing(self, name: str, needed: str) -> MissingColumnError:
         """Return the error that tells about an absent column; `needed` begins the sentence."""
         held = next((f"; {told}" for told in self.unread if told.startswith(f"column {name} ")), "")
-        other = held or f"; {did_you_mean(name, self)}"
-        return MissingColumnError(name, f"{needed} column {name}, which the recording does not have{other}")
+        absent = f" as numbers{held}" if held else f"; {did_you_mean(name, self)}"
+        return MissingColumnError(name, f"{needed} column {name}, which the recording does not have{absent}")
 
     def why_blank(self) -> str:
         """Return what is wrong with the columns that were read: one is not there, or blank in places."""
