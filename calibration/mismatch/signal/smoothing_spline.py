@@ -59,7 +59,7 @@ CORE = 512
 MOST_FITTED = 4
 """Parts in which a spline is found: longer recordings cost no more."""
 UNEVEN = 3.0
-"""Factor between a step of time and the usual one beyond which no difference is taken across it."""
+"""Factor between a step of time and the usual one beyond which readings are not taken together across it."""
 BRIDGED = 8
 """Instants from a reading beyond which a blank is left alone."""
 UNKNOWN = 1e-4
@@ -211,15 +211,20 @@ def differences(time: Array, run: NDArray[np.int64], order: int) -> Array:
     """
     if len(time) <= order:
         return np.zeros((0, order + 1))
-    steps = np.diff(time)
-    within = (np.diff(run) == 0) & (steps > 0)
-    usual = float(np.median(steps[within])) if within.any() else 0.0
-    within &= (steps > usual / UNEVEN) & (steps < usual * UNEVEN)
-    whole = np.all([within[k : len(steps) - order + 1 + k] for k in range(order)], axis=0)
+    within, usual = even_steps(time, run)
+    whole = np.all([within[k : len(within) - order + 1 + k] for k in range(order)], axis=0)
     at = np.stack([time[k : len(time) - order + k] for k in range(order + 1)], axis=1)
     apart = np.where(whole[:, None, None], at[:, :, None] - at[:, None, :], 1.0)
     apart[:, range(order + 1), range(order + 1)] = 1.0
     return np.asarray(np.where(whole[:, None], factorial(order) * usual**order / np.prod(apart, axis=2), 0.0))
+
+
+def even_steps(time: Array, run: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:
+    """Return which steps of time (step,) are even and within a run, and the usual step, 0 where there is none."""
+    steps = np.diff(time)
+    within = (np.diff(run) == 0) & (steps > 0)
+    usual = float(np.median(steps[within])) if within.any() else 0.0
+    return within & (steps > usual / UNEVEN) & (steps < usual * UNEVEN), usual
 
 
 def fitted_rows(readings: Array, run: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.smoothing_spline import BRIDGED, even_steps
 from regolithd.calibration.mismatch.signal.stein import Estimate, squared_error
 
 if TYPE_CHECKING:
@@ -29,14 +30,10 @@ Array = NDArray[np.float64]
 HALF_WIDTHS = (6, 12, 24, 48)
 """Readings before and after, of which an estimate is a function (a choice: each twice as far as the one before)."""
 FEWEST_WINDOWS = 6
-"""Windows for each weight that is found from them, at least (a choice: five have a fifth more error than many)."""
+"""Windows for each weight that is found from them, at least (a choice: chance adds a sixth of the error then)."""
 FLOOR_HALF_WIDTH, QUIETEST = 12, 0.25
 """Readings before and after in a window of which the noise is asked, and the share of its directions that are noise
-alone at least (a choice: six oscillations leave half of them; by chance the quarter is a twentieth too low)."""
-UNEVEN = 3.0
-"""Factor between a step of time and the usual one beyond which readings belong to no window together."""
-BRIDGED = 8
-"""Blanks one after the other that a window may have."""
+alone at least (a choice: six oscillations leave half of them; chance makes the deviation a fifteenth too low)."""
 FILLINGS = 2
 """Rounds in which a blank gets the estimate that its neighbours give, the first from a straight line (a choice)."""
 
@@ -134,12 +131,7 @@ def noise_floor(readings: Array, pieces: Sequence[slice]) -> float:
 
 def even_pieces(readings: Array, time: Array, run: NDArray[np.int64]) -> list[slice]:
     """Return the stretches of a recording in which readings follow each other at even steps, with few blanks."""
-    if len(time) < 2:
-        return []
-    steps = np.diff(time)
-    within = (np.diff(run) == 0) & (steps > 0)
-    usual = float(np.median(steps[within])) if within.any() else 0.0
-    within &= (steps > usual / UNEVEN) & (steps < usual * UNEVEN)
+    within, _ = even_steps(time, run)
     known = np.flatnonzero(np.isfinite(readings))
     for place in np.flatnonzero(np.diff(known) > BRIDGED + 1):
         within[known[place] : known[place + 1]] = False

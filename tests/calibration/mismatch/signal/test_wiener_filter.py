@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.smoothing_spline import BRIDGED
 from regolithd.calibration.mismatch.signal.stein import squared_error
 from regolithd.calibration.mismatch.signal.wiener_filter import (
-    BRIDGED,
     HALF_WIDTHS,
     WienerFilter,
     best_filter,
