@@ -107,6 +107,16 @@ def test_a_column_sets_a_covariate_that_is_linear_in_it() -> None:
     assert (temperature.low, temperature.high) == (10.0, 30.0)
 
 
+def test_a_speed_is_not_varied_from_standstill() -> None:
+    """A machine that rests for a third of the time has a slowest motion, and 0 is none."""
+    columns = table()
+    columns["speed_rad_s"] = np.where(np.arange(len(columns["t_s"])) % 3 == 0, 0.0, columns["speed_rad_s"])
+    problem = problem_of(columns)
+    moving = np.abs(problem.covariates["wheel_speed"][problem.covariates["wheel_speed"] != 0])
+    setting = settings_of(problem, ["wheel_speed"])["wheel_speed"]
+    assert 0 < setting.low <= np.quantile(moving, 0.02)
+
+
 def test_a_covariate_that_nothing_says_how_to_vary_is_not_set() -> None:
     """A constant one without a span."""
 

@@ -95,6 +95,17 @@ def test_each_of_several_channels_has_its_own_drawings_and_findings() -> None:
     assert "thrust_N</td>" in page
 
 
+def test_a_channel_in_which_something_was_found_comes_first() -> None:
+    """Whatever the simulation's order is."""
+    thrust = replace(evidence(1800.0), channel="thrust_N", unit="N")
+    both = replace(evidence(1800.0), others=(thrust,))
+    pushing = replace(VISCOUS, name="quadratic-drag", channel="thrust_N", rmse_before=3.2, rmse_after=2.1)
+    fits = (ANSWER.fit, FitImprovement("thrust_N", 3.3, 2.2, 2.0))
+    page = render_report(replace(ANSWER, effects=(pushing,), unexplained=(), fits=fits), both, FROM)
+    first, second = page.split("<h2>Where they differ: <code>")[1:]
+    assert (first.split("<")[0], second.split("<")[0]) == ("thrust_N", "motor_current_A")
+
+
 def test_a_curve_that_changed_is_called_by_what_it_is_over() -> None:
     """In the words of the machine; the key that names it in the answer stands nowhere."""
     labels = Labels(covariates={"position": "leaf angle (rad)"})
