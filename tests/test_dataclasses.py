@@ -73,6 +73,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "InitialState",
         "FurtherColumns",
         "WienerFilter",
+        "NoisyColumn",
         "_Courses",
         "_Products",
         "_InNoise",

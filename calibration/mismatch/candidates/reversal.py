@@ -225,6 +225,7 @@ class _Beside:
     laws: how many friction may follow
     decay: drag that decays from standstill among them; None: none
     made: columns of the other laws, and products of all, by the shape with which they reverse, of the last few
+    known: sums of squares that were asked for, by shape and decay
     """
 
     problem: Problem
@@ -237,6 +238,7 @@ class _Beside:
     laws: int
     decay: Decay | None = None
     made: dict[tuple[tuple[str, object], ...], tuple[Array, Array]] = field(default_factory=dict)
+    known: dict[tuple[tuple[tuple[str, object], ...], Decay | None], float] = field(default_factory=dict)
 
     def gain(self, left: float, step: float) -> float:
         """Return the Δχ² of what leaves one sum of squares over what leaves another."""
@@ -252,6 +254,12 @@ class _Beside:
 
         What decays from standstill is drag beyond the other laws: less drag there would be a gradual reversal.
         """
+        key = tuple(shape.items()), self.decay
+        if key not in self.known:
+            self.known[key] = self._squares_left(shape)
+        return self.known[key]
+
+    def _squares_left(self, shape: Shape) -> float:
         laws, products = self._laws_of(shape)
         if self.decay is None:
             return squares_left(products)[0]
@@ -277,7 +285,7 @@ class _Beside:
     def with_free(self, columns: Array) -> _Beside:
         """Return the same with further columns (column, time, wheel) beside the free parameters."""
         further = _in_order(self.problem, list(columns), self.whitening, self.deviation)
-        return replace(self, free=np.concatenate((self.free, further)), made={})
+        return replace(self, free=np.concatenate((self.free, further)), made={}, known={})
 
     def _products(self, *columns: Array) -> Array:
         """Return the products of columns, shape (column, reading), with each other."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-BOTH_WAYS = 2
-"""Signs that a covariate has which shows a direction."""
 LEAST_AGREEMENT = 0.9
 """Share of the readings in motion in which the covariate has the sign of the motion (a choice)."""
 LEAST_SHARE = 0.5
@@ -40,7 +38,7 @@ def notes_on_shown_direction(decision: Decision) -> tuple[str, ...]:
         read = problem.mask & np.isin(np.arange(left.shape[1]), term.wheels)
         moving = read & (direction != 0) & (shown != 0)
         ways = shown[moving] * direction[moving]
-        if np.unique(shown[moving]).size < BOTH_WAYS or abs(float(np.mean(ways))) < 2 * LEAST_AGREEMENT - 1:
+        if np.unique(shown[moving]).size < 2 or abs(float(np.mean(ways))) < 2 * LEAST_AGREEMENT - 1:
             continue
         held = (left + curve)[read]
         of_sign, of_speed = (_explained(held, each[read]) for each in (shown, direction))

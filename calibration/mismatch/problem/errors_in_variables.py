@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.problem.true_values import (
+    NoisyColumn,
     NormalTruth,
     filtered_where_better,
     refined_by_density,
@@ -98,9 +99,8 @@ def expected_inputs(
             continue
         moving, deviation = np.where(rest[:, k], np.nan, stabilised[:, k]), scales[k].deviation
         before = truths.column(k)
-        of_column = stabilised[:, k], deviation, recording.time_s, recording.run
-        truth = smooth_where_better(*of_column, before, rest[:, k])
-        truth = filtered_where_better(*of_column, truth, rest[:, k])
+        noisy = NoisyColumn(stabilised[:, k], deviation, recording.time_s, recording.run, rest[:, k])
+        truth = filtered_where_better(noisy, smooth_where_better(noisy, before))
         if name not in normal:
             smooth[:, k] = refined_by_density(moving, deviation, starts, truth)
         elif truth is not before:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,34 +68,52 @@ class NormalTruth:
     persistence: float
 
 
-def smooth_where_better(
-    readings: Array,
-    deviation: float,
-    time: Array,
-    run: NDArray[np.int64],
-    normal: NormalTruth,
-    rest: NDArray[np.bool_],
-) -> NormalTruth:
-    """Return what a smoothing spline says of the truth where that is clearly nearer to it; else `normal`.
+@dataclass(frozen=True, eq=False)
+class NoisyColumn:
+    """Readings of one column on a scale on which their errors are normal and alike.
 
-    `readings` (time,), NaN where there are none, have normal errors of this deviation; those at `rest` have none, and
-    say where a motion begins and ends.
+    Attributes
+    ----------
+    readings: shape (time,), NaN where there are none
+    deviation: of their errors
+    time, run: of the recording, shape (time,)
+    rest: those that have no error, and say where a motion begins and ends
     """
-    known = np.isfinite(readings) & ~rest
+
+    readings: Array
+    deviation: float
+    time: Array
+    run: NDArray[np.int64]
+    rest: NDArray[np.bool_]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Return where there is a reading with an error."""
+        return np.isfinite(self.readings) & ~self.rest
+
+    @cached_property
+    def fitted(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the rows in which models are found, and numbers of their unbroken stretches (`fitted_rows`)."""
+        return fitted_rows(self.readings, self.run)
+
+
+def smooth_where_better(column: NoisyColumn, normal: NormalTruth) -> NormalTruth:
+    """Return what a smoothing spline says of the truth where that is clearly nearer to it; else `normal`."""
+    known, deviation = column.known, column.deviation
     if not _matters(deviation, known, normal):
         return normal
-    centred = readings - normal.prior_mean
-    rows, runs = fitted_rows(readings, run)
+    centred = column.readings - normal.prior_mean
+    rows, runs = column.fitted
     if not _matters(deviation, known[rows], normal):  # it was read elsewhere
         return normal
-    spline = best_spline(centred[rows], deviation, time[rows], runs, rest[rows])
-    there = spline.estimate(centred[rows], deviation, differences(time[rows], runs, spline.order))
+    spline = best_spline(centred[rows], deviation, column.time[rows], runs, column.rest[rows])
+    there = spline.estimate(centred[rows], deviation, differences(column.time[rows], runs, spline.order))
     new = _at(there, known[rows])
     old = _at(Estimate((normal.mean - normal.prior_mean)[rows], normal.variance[rows]), known[rows])
     read = centred[rows][known[rows]]
     if not (clearly_better(read, deviation**2, new, old, 2) and consistent(read, deviation**2, new)):
         return normal
-    smooth = spline.mean(centred, deviation, differences(time, run, spline.order))
+    smooth = spline.mean(centred, deviation, differences(column.time, column.run, spline.order))
     if not consistent_throughout(centred[known], deviation**2, smooth[known]):
         return normal
     smooth += normal.prior_mean
@@ -104,26 +123,19 @@ def smooth_where_better(
     )
 
 
-def filtered_where_better(
-    readings: Array,
-    deviation: float,
-    time: Array,
-    run: NDArray[np.int64],
-    before: NormalTruth,
-    rest: NDArray[np.bool_],
-) -> NormalTruth:
+def filtered_where_better(column: NoisyColumn, before: NormalTruth) -> NormalTruth:
     """Return what a stationary process of any spectrum says of the truth where that is clearly nearer to it.
 
     Else what was said of it `before`. What is left of the error is then correlated with no reading of a window, so that
     nothing seems to follow the prediction or what it was shortly before; a small gain is enough.
     """
-    known = np.isfinite(readings) & ~rest
-    if not _matters(deviation, known, before):
+    known, variance = column.known, column.deviation**2
+    if not _matters(column.deviation, known, before):
         return before
-    centred, variance = readings - before.prior_mean, deviation**2
-    rows, runs = fitted_rows(readings, run)
-    pieces = even_pieces(centred[rows], time[rows], runs)
-    found = best_filter(centred[rows], variance, pieces, rest[rows])
+    centred = column.readings - before.prior_mean
+    rows, runs = column.fitted
+    pieces = even_pieces(centred[rows], column.time[rows], runs)
+    found = best_filter(centred[rows], variance, pieces, column.rest[rows])
     if found is None:
         return before
     there = found.applied(centred[rows], pieces, variance)
@@ -137,10 +149,10 @@ def filtered_where_better(
         clearly_better(read, variance, new, old, found.fitted, LEAST_FILTER_GAIN) and consistent(read, variance, new)
     ):
         return before
-    everywhere = found.applied(centred, even_pieces(centred, time, run), variance)
+    everywhere = found.applied(centred, even_pieces(centred, column.time, column.run), variance)
     told = np.isfinite(everywhere.mean) & np.isfinite(before.mean)
     mean = np.where(told, everywhere.mean + before.prior_mean, before.mean)
-    if not consistent_throughout(readings[known], variance, mean[known]):
+    if not consistent_throughout(column.readings[known], variance, mean[known]):
         return before
     left = np.maximum(everywhere.variance, LEAST_LEFT * variance)
     return replace(before, mean=mean, variance=np.where(told, left, before.variance))

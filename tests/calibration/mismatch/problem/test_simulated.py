@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.data.recording import Recording, from_column
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.errors_in_variables import normal_truths
 from regolithd.calibration.mismatch.problem.simulated import inputs_of, simulated
-from regolithd.calibration.mismatch.problem.true_values import smooth_where_better, still_at_rest
+from regolithd.calibration.mismatch.problem.true_values import NoisyColumn, smooth_where_better, still_at_rest
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ def test_what_the_speed_is_computed_from_has_no_density() -> None:
     found = simulated(inputs_of(recording, Winch()), Winch(), {"gain_V_W": 0.05}, THRESHOLDS).recording
     normal = normal_truths(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
     splines = [
-        smooth_where_better(each, 2.0, TIME_S, found.run, normal.column(k), np.zeros(ROWS, np.bool_))
+        smooth_where_better(NoisyColumn(each, 2.0, TIME_S, found.run, np.zeros(ROWS, np.bool_)), normal.column(k))
         for k, each in enumerate((power, rpm))
     ]
     rpm_alone = still_at_rest(rpm, 2.0, splines[1]).mean

@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import (
 )
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.true_values import (
+    NoisyColumn,
     NormalTruth,
     filtered_where_better,
     refined_by_density,
@@ -164,9 +165,9 @@ def test_inputs_that_are_to_stay_normal_have_no_density() -> None:
     errors = {"speed": SensorError(absolute=0.3)}
     found = expected_inputs(recording, errors, normal={"speed"}).channels["speed"]
     before = normal_truths(readings[:, None], np.array([0.09]), START).column(0)
-    given = readings, 0.3, recording.time_s, recording.run
-    spline = smooth_where_better(*given, before, NO_REST)
-    expected = filtered_where_better(*given, spline, NO_REST)
+    column = NoisyColumn(readings, 0.3, recording.time_s, recording.run, NO_REST)
+    spline = smooth_where_better(column, before)
+    expected = filtered_where_better(column, spline)
     assert np.std(expected.mean - truth) < np.std(spline.mean - truth)
     np.testing.assert_allclose(found[:, 0], still_at_rest(readings, 0.3, expected).mean, rtol=1e-6)
 
@@ -218,7 +219,7 @@ def smoothed(truth: Array, error: float, stated: float = 1.0) -> tuple[Array, No
     readings = truth + np.random.default_rng(20).normal(0, error, truth.shape)
     deviation = stated * error
     normal = normal_truths(readings[:, None], np.array([deviation**2]), START).column(0)
-    return readings, normal, smooth_where_better(readings, deviation, TIME, ONE_RUN, normal, NO_REST)
+    return readings, normal, smooth_where_better(NoisyColumn(readings, deviation, TIME, ONE_RUN, NO_REST), normal)
 
 
 @pytest.mark.parametrize("error", [0.003, 0.01, 0.05])
@@ -278,9 +279,8 @@ def test_a_column_that_was_read_for_a_part_of_the_time_is_no_error() -> None:
     some = slice(10 * COUNT, 11 * COUNT)
     readings[some] = to_and_fro() + np.random.default_rng(21).normal(0, 0.05, COUNT)
     normal = normal_truths(readings[:, None], np.array([0.0025]), START).column(0)
-    found = smooth_where_better(
-        readings, 0.05, time, np.zeros(len(time), np.int64), normal, np.zeros(len(time), np.bool_)
-    )
+    column = NoisyColumn(readings, 0.05, time, np.zeros(len(time), np.int64), np.zeros(len(time), np.bool_))
+    found = smooth_where_better(column, normal)
     np.testing.assert_array_equal(np.isfinite(found.mean), np.isfinite(readings))
     assert np.std(found.mean[some] - to_and_fro()) < 0.05
 
