@@ -118,7 +118,9 @@ def _merged(comparisons: Sequence[Comparison], simulation: Simulation, *, may_re
     `may_release`: whether the channels' parameters may leave priors that they contradict.
     """
     posterior = _joint(comparisons, simulation, may_release=may_release)
-    answer = merged_answers([each.answer for each in comparisons], posterior.parameters(simulation.parameters))
+    common = posterior.parameters(simulation.parameters)
+    own = [one for each in comparisons for one in each.answer.parameters if one.name not in simulation.parameters]
+    answer = merged_answers([each.answer for each in comparisons], (*common, *own))
     first, *others = (each.evidence for each in comparisons)
     # As in one channel: the terms of named effects, then those of changes.
     named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]

@@ -22,12 +22,13 @@ from regolithd.calibration.mismatch.signal.normal_interval import std_of_interva
 from regolithd.calibration.mismatch.simulation.corrected_curves import TABLE, entry_of, stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects as stated_effects  # noqa: PLC0414  # for its users
 from regolithd.calibration.mismatch.simulation.load import model_folder, read_tables
+from regolithd.calibration.mismatch.simulation.stated_priors import OWN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from regolithd.calibration.mismatch.answer import Answer, Effect, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Effect, Evidence
     from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
@@ -54,13 +55,33 @@ def write_corrected(
     tables, terms = stated_tables(simulation), evidence.contributions
     # Beside something unexplained the answer's parameters are those of the fit that has it: others would imitate it.
     imitating = bool(answer.unexplained)
-    values: Mapping[str, float] = {**evidence.values, **{each.name: each.value for each in answer.parameters}}
+    common = {each.name: each.value for each in answer.parameters if each.name in simulation.parameters}
+    deviations = {each.name: each.value - common[of] for each, of in _of_wheels(answer, simulation)}
+    values: Mapping[str, float] = {**evidence.values, **common, **deviations}
     curves: list[StatedCurve] = []
     if empirical and answer.unexplained:
         values, terms, curves = with_curves(answer, evidence)
         imitating = False
     new = corrected_tables(tables, simulation, values, terms, answer.effects, within_priors=imitating, curves=curves)
-    write_simulation(path, simulation, new)
+    write_simulation(path, simulation, _with_own(new, simulation, deviations))
+
+
+def _of_wheels(answer: Answer, simulation: Simulation) -> list[tuple[CalibratedParameter, str]]:
+    """Return what the answer tells of single wheels' own values, with the parameter of which each is one."""
+    own = sorted(simulation.own_to_each_wheel)
+    pairs = [(each, name) for each in answer.parameters for name in own if each.name.startswith(own_name(name, ""))]
+    return [(each, name) for each, name in pairs if each.name not in simulation.parameters]
+
+
+def _with_own(tables: Mapping[str, Any], simulation: Simulation, deviations: Mapping[str, float]) -> dict[str, Any]:
+    """Return SIM.toml's tables with the wheels' deviations that were stated or found, where `[parameters]` has them."""
+    stated = dict(tables.get("parameters", {}))
+    for name in simulation.own_to_each_wheel & set(stated):
+        own, begins = dict(simulation.parameters[name].own), own_name(name, "")
+        own |= {each.removeprefix(begins): value for each, value in deviations.items() if each.startswith(begins)}
+        if own:
+            stated[name] = {**stated[name], OWN: own}
+    return {**tables, "parameters": stated} if stated else dict(tables)
 
 
 def stated_tables(simulation: Simulation) -> dict[str, Any]:

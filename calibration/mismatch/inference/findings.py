@@ -32,6 +32,7 @@ from regolithd.calibration.mismatch.inference.other_covariates import (
     notes_on_a_curve_in_place,
     notes_on_other_covariates,
 )
+from regolithd.calibration.mismatch.inference.own_values import far_enough, notes_on_own_values, own_values
 from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
 from regolithd.calibration.mismatch.inference.probability import (
     decided_by_evidence,
@@ -94,7 +95,8 @@ def findings_of(
     """Return what was found; `applicable` are those candidates that this recording allows, `drawn` is `drawn_for`."""
     problem = decision.equations.problem
     effects, changes = named_effects(decision, held_out, drawn)
-    parameters = calibrated_parameters(decision, drawn)
+    of_wheels = own_values(decision, drawn)
+    parameters = (*calibrated_parameters(decision, drawn), *far_enough(decision, of_wheels))
     limits, places = decision.equations.thresholds, unexplained(decision)
     rest = bool(decision.unnamed)
     moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
@@ -107,6 +109,7 @@ def findings_of(
         left_out=problem.left_out,
         notes=(
             *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
+            *notes_on_own_values(decision, of_wheels),
             *decision.notes,
             *notes_on_confined_laws(decision, places),
             *notes_on_other_covariates(decision),

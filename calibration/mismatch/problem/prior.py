@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 RUNS_WITHIN = 0.5
@@ -19,6 +19,7 @@ class Prior:
 
     One that is not `told` is fitted like any other, but is no part of the answer: nobody can act on its value. One that
     a recording would move out of its `bounds`, where it cannot be, is held at its value: something else does that.
+    `own` are known deviations of some wheels from the value, of a parameter that is `own_to_each_wheel`.
     """
 
     value: float
@@ -26,6 +27,15 @@ class Prior:
     unit: str = "1"
     told: bool = True
     bounds: tuple[float, float] = (-inf, inf)
+    own: tuple[tuple[str, float], ...] = ()
+
+    def of_one_wheel(self, share: float) -> Prior:
+        """Return the prior of one wheel's value about the common one, whose standard deviation is a share of this."""
+        return replace(self, std=share * self.std, own=())
+
+    def own_of(self, wheel: int | str) -> float:
+        """Return the stated deviation of a wheel from the common value."""
+        return dict(self.own).get(str(wheel), 0.0)
 
     @property
     def is_hardly_known(self) -> bool:

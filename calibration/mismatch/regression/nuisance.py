@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +13,10 @@ from regolithd.calibration.mismatch.problem.initial_states import initial_states
 from regolithd.calibration.mismatch.problem.prior import own_name
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Mapping
 
     from regolithd.calibration.mismatch.problem.initial_states import InitialState
+    from regolithd.calibration.mismatch.problem.prior import Prior
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Fit
@@ -40,6 +41,7 @@ class Nuisance:
     precision: one over the prior variance of each scaled coefficient, shape (parameter,)
     centre: the prior's mean of each scaled coefficient: 0 at the stated values, shape (parameter,)
     stated: those of the names that are sizes of effects which the simulation was corrected by
+    own: parameter and wheel of each wheel's own deviation, by its name
     states: the initial states of runs, whose names are last
     """
 
@@ -48,6 +50,7 @@ class Nuisance:
     precision: Array
     centre: Array
     stated: frozenset[str] = frozenset()
+    own: Mapping[str, tuple[str, int | str]] = field(default_factory=dict)
     states: tuple[InitialState, ...] = ()
 
     @property
@@ -70,13 +73,18 @@ class Nuisance:
 
     def reach(self, place: int, problem: Problem) -> float:
         """Return how far one of the simulation's own parameters is off if it is wrong [standard deviations]."""
-        prior = problem.simulation.parameters[self.names[place]]
-        return prior.reach(problem.thresholds.furthest_linearisation_stds)
+        return self._prior(place, problem).reach(problem.thresholds.furthest_linearisation_stds)
 
     def furthest(self, place: int, problem: Problem) -> float:
         """Return how far it may be off at most [standard deviations]."""
-        prior = problem.simulation.parameters[self.names[place]]
-        return prior.furthest(problem.thresholds.furthest_linearisation_stds)
+        return self._prior(place, problem).furthest(problem.thresholds.furthest_linearisation_stds)
+
+    def _prior(self, place: int, problem: Problem) -> Prior:
+        """Return the prior of a parameter; of a wheel's own deviation that of the wheel's value."""
+        name, parameters = self.names[place], problem.simulation.parameters
+        if name in self.own:
+            return parameters[self.own[name][0]].of_one_wheel(problem.thresholds.own_share)
+        return parameters[name]
 
     def prior_stds_away(self, fit: Fit) -> Array:
         """Return how far each parameter is from its prior in a fit, in the prior's standard deviations."""
@@ -85,21 +93,28 @@ class Nuisance:
 
     def contradicting_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
         """Return the places of the simulation's own parameters whose priors the readings contradict in a fit."""
+        beyond = self._contradicted(fit, problem)
+        return np.array([place for place in self.told(problem) if beyond[place]], np.int64)
+
+    def contradicting_deviations(self, fit: Fit, problem: Problem) -> list[int]:
+        """Return the places of told parameters' wheels whose own deviations the readings contradict in a fit."""
+        beyond, parameters = self._contradicted(fit, problem), problem.simulation.parameters
+        of = [(place, self.own[name][0]) for place, name in enumerate(self.names) if name in self.own]
+        return [place for place, name in of if beyond[place] and parameters[name].told]
+
+    def _contradicted(self, fit: Fit, problem: Problem) -> NDArray[np.bool_]:
         variance = np.diag(fit.covariance)[: len(self.columns)] * self.precision
-        return self._own(beyond_prior_predictive(self.prior_stds_away(fit), variance, problem.thresholds), problem)
+        return beyond_prior_predictive(self.prior_stds_away(fit), variance, problem.thresholds)
 
     def leaving_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
         """Return the places of the simulation's own parameters that are beyond their priors in a fit."""
-        return self._own(self.prior_stds_away(fit) > problem.thresholds.furthest_prior_stds, problem)
+        beyond = self.prior_stds_away(fit) > problem.thresholds.furthest_prior_stds
+        return np.array([place for place in self.told(problem) if beyond[place]], np.int64)
 
     def told(self, problem: Problem) -> list[int]:
         """Return the places of the simulation's own parameters that an answer tells."""
         parameters = problem.simulation.parameters
         return [place for place, name in enumerate(self.names) if name in parameters and parameters[name].told]
-
-    def _own(self, beyond: NDArray[np.bool_], problem: Problem) -> NDArray[np.int64]:
-        """Return the places of those beyond that are the simulation's own parameters, and told."""
-        return np.array([place for place in self.told(problem) if beyond[place]], np.int64)
 
 
 def beyond_prior_predictive(away: Array, variance: Array, thresholds: Thresholds) -> NDArray[np.bool_]:
@@ -127,20 +142,31 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     states = tuple(initial_states(design.problem))
     names, stds = [*names, *(state.name for state in states)], [*stds, *(state.std for state in states)]
     columns = [*columns, *as_shown(design.problem, [state.column for state in states])]
-    away = np.array([_from_prior(design.problem, name) for name in names])
+    own = _own_deviations(design.problem)
+    away = np.array([_from_prior(design.problem, name, own) for name in names])
     design, places = design.extended(columns)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
     centre = away * design.scale[list(places)] if places else np.zeros(0)
     about = stated_names(design.problem)
     stated = frozenset(name for name in names if name.startswith(about))
-    return design, Nuisance(tuple(names), places, precision, centre, stated, states)
+    return design, Nuisance(tuple(names), places, precision, centre, stated, own, states)
 
 
-def _from_prior(problem: Problem, name: str) -> float:
-    """Return how far the prior's mean is from where the problem is linearised; 0 for a wheel's own deviation."""
-    prior = problem.simulation.parameters.get(name)
-    return 0.0 if prior is None else prior.value - problem.values[name]
+def _from_prior(problem: Problem, name: str, own: Mapping[str, tuple[str, int | str]]) -> float:
+    """Return how far the prior's mean is from where the problem is linearised, without any wheel's own deviation."""
+    parameters = problem.simulation.parameters
+    if name in own:
+        parameter, wheel = own[name]
+        return parameters[parameter].own_of(wheel)
+    return parameters[name].value - problem.values[name] if name in parameters else 0.0
+
+
+def _own_deviations(problem: Problem) -> dict[str, tuple[str, int | str]]:
+    """Return parameter and wheel of each wheel's own deviation of a free parameter, by its name."""
+    simulation, wheels = problem.simulation, problem.recording.wheels
+    own = [name for name in problem.free if name in simulation.own_to_each_wheel] if len(wheels) > 1 else []
+    return {own_name(name, wheel): (name, wheel) for name in own for wheel in wheels}
 
 
 def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
@@ -150,11 +176,10 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     names, stds = list(free), list(free.values())
     found = list(as_shown(problem, [problem.tangent(name) for name in free]))
     of_parameter = dict(zip(names, found, strict=True))
-    for name in free if len(wheels) > 1 else ():
-        if name in simulation.own_to_each_wheel:
-            names += [own_name(name, wheel) for wheel in wheels]
-            stds += [problem.thresholds.own_share * free[name]] * len(wheels)
-            found += [np.where(np.array(wheels) == wheel, of_parameter[name], 0.0) for wheel in wheels]
+    for own, (name, wheel) in _own_deviations(problem).items():
+        names.append(own)
+        stds.append(simulation.parameters[name].of_one_wheel(problem.thresholds.own_share).std)
+        found.append(np.where(np.array(wheels) == wheel, of_parameter[name], 0.0))
     for effect, about in zip(problem.stated, stated_names(problem), strict=True):
         if effect.relative_std > 0 and about not in problem.held:
             names, stds, found = [*names, about], [*stds, effect.relative_std], [*found, effect.column]

@@ -143,15 +143,18 @@ def _releases(
     """Yield the names, and all but one, beside wider priors: of each parameter, then of all that are contradicted.
 
     Nothing where none is contradicted. Where one is, another may be the one that was stated wrongly: held by its own
-    prior, it has left the way to those that act alike.
+    prior, it has left the way to those that act alike. One wheel's own deviation stands beside all names: what acts as
+    a parameter on one wheel alone may well be a name.
     """
     nuisance, problem = equations.nuisance, equations.problem
     for removed in (None, *range(len(named.terms))):
         kept = named.terms if removed is None else named.without(removed)
-        contradicted = tuple(nuisance.contradicting_their_priors(equations.fit(kept), problem).tolist())
+        fit = equations.fit(kept)
+        own = nuisance.contradicting_deviations(fit, problem) if removed is None else []
+        contradicted = (*nuisance.contradicting_their_priors(fit, problem).tolist(), *own)
         if not contradicted:
             continue
-        for places in dict.fromkeys([*((place,) for place in nuisance.told(problem)), contradicted]):
+        for places in dict.fromkeys([*((place,) for place in (*nuisance.told(problem), *own)), contradicted]):
             freed = equations.with_nuisance(nuisance.widened(places, problem))
             fit = freed.fit(kept)
             evidence = _evidence(equations, fit, places, entry_threshold)

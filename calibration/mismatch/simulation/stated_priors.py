@@ -14,8 +14,12 @@ if TYPE_CHECKING:
 
 ENGINE_TABLES = ("simulation", "effects", "empirical_curves")
 """Tables that are no parameters."""
-FIELDS = ("value", "std", "unit")
+OWN = "own"
+"""The key of the deviations of single wheels from the common value: a table from wheel to number."""
+FIELDS = ("value", "std", "unit", OWN)
 """Keys of `[parameters.NAME]`."""
+TAKES = "value, std, unit and own"
+"""The same in a message."""
 SENSORS = "sensors"
 """The table of the errors of recorded inputs; a key of it that is no parameter is one of these."""
 GREATEST_NUMBER = 1e100
@@ -62,13 +66,21 @@ def _fields(parameter: str, given: object) -> dict[str, Any]:
     """Return what `[parameters.NAME]` says."""
     keys = ("parameters", parameter)
     if not isinstance(given, dict):
-        raise SimulationError(f"[parameters.{parameter}] takes value, std and unit, not {given!r}", keys)
+        raise SimulationError(f"[parameters.{parameter}] takes {TAKES}, not {given!r}", keys)
     for name in given:
         if name not in FIELDS:
-            told = f"[parameters.{parameter}] takes value, std and unit, not {name}; {did_you_mean(name, FIELDS)}"
+            told = f"[parameters.{parameter}] takes {TAKES}, not {name}; {did_you_mean(name, FIELDS)}"
             raise SimulationError(told, (*keys, name))
     numbers = {name: finite_number(given[name], (*keys, name)) for name in ("value", "std") if name in given}
-    return numbers | ({"unit": str(given["unit"])} if "unit" in given else {})
+    unit = {"unit": str(given["unit"])} if "unit" in given else {}
+    return numbers | unit | ({OWN: _own(given[OWN], (*keys, OWN))} if OWN in given else {})
+
+
+def _own(given: object, keys: tuple[str, ...]) -> tuple[tuple[str, float], ...]:
+    """Return each wheel's deviation from the common value."""
+    if not isinstance(given, dict):
+        raise SimulationError(f"[{'.'.join(keys)}] has a deviation for each wheel, wheel = number, not {given!r}", keys)
+    return tuple((wheel, finite_number(value, (*keys, wheel))) for wheel, value in given.items())
 
 
 def _take(

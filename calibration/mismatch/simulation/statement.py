@@ -62,6 +62,8 @@ def _wrong_priors(simulation: Simulation) -> Iterator[str]:
             yield f'parameters["{name}"] must have a finite value and std, not {prior!r}'
         elif prior.std < 0:
             yield f'parameters["{name}"] must have a std of 0 (exact) or more, not {prior.std!r}'
+        elif prior.own and name not in simulation.own_to_each_wheel:
+            yield f"{name} has deviations of single wheels (own), and is not in own_to_each_wheel"
     for name in simulation.own_to_each_wheel:
         if name not in simulation.parameters:
             yield f"own_to_each_wheel names {name}, which is no parameter; {did_you_mean(name, simulation.parameters)}"
