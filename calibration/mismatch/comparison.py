@@ -196,6 +196,12 @@ def decided(
         at_once, start_at_once = _settled(candidates, stated, replace(pose, at_once=True), progress)
         if at_once.decision.does_without_curves_of(found.decision):
             found, start = at_once, start_at_once
+    if found.decision.late_inputs and len(found.decision.whole.terms) > 1:
+        # An input that nearly repeats, late by much of what it repeats in, may stand for what has no name.
+        candidates = _without_delays(candidates, frozenset(found.decision.late_inputs))
+        without, start_without = _settled(candidates, stated, pose, progress)
+        if without.decision.is_as_probable_as(found.decision):
+            found, start = without, start_without
     decision = found.decision
     notes = (
         *_notes_on_values(decision, start),
@@ -221,7 +227,12 @@ def _settled(
         if not further | out | unknown | refused:
             return found, start
         pose = replace(pose, fed=pose.fed | further, held=pose.held | out, unknown=pose.unknown | unknown)
-        candidates = [each.without(refused) if isinstance(each, SensorDelay) else each for each in candidates]
+        candidates = _without_delays(candidates, refused)
+
+
+def _without_delays(candidates: Sequence[Candidate], columns: frozenset[str]) -> list[Candidate]:
+    """Return the candidates without delays of some columns."""
+    return [each.without(columns) if isinstance(each, SensorDelay) else each for each in candidates]
 
 
 def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.regression.candidate_groups import with_cand
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
-from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
+from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, entry_cost, passes_entry_test
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
 from regolithd.calibration.mismatch.selection.implausible_effects import drop_what_the_implausible_explains
 from regolithd.calibration.mismatch.selection.noise_estimation import (
@@ -133,6 +133,21 @@ class Decision:
         independent = float(self.equations.problem.mask.sum()) / self.noise.autocorrelation_time
         by_chance = sum(other.equations.penalty(term) for term in other.unnamed)
         return not self.unnamed and independent * (self.power_left / other.power_left - 1) <= by_chance
+
+    def is_as_probable_as(self, other: Decision) -> bool:
+        """Return whether another decision leaves less by no more than its further terms are charged.
+
+        Both may have simulated other inputs: they are compared by the power of what they leave.
+        """
+        independent = float(self.equations.problem.mask.sum()) / self.noise.autocorrelation_time
+        gained = independent * np.log(self.power_left / other.power_left)
+        return bool(gained <= other._charged - self._charged)
+
+    @property
+    def _charged(self) -> float:
+        """Δχ² that the terms are charged: by their penalties, and for their entry."""
+        terms = self.whole.terms
+        return entry_cost(self.equations, terms, self.entry_threshold) + sum(map(self.equations.penalty, terms))
 
     @property
     def is_late_alone(self) -> bool:

@@ -9,7 +9,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +26,26 @@ def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float
     """Return the share of Δχ² that a curve adds to names, or has in their place."""
     gain = with_curve.delta_chi2 - names.delta_chi2
     return gain / max(explained(equations, names) + gain, 1e-9)
+
+
+def misfit_beside(equations: NormalEquations, names: Fit, with_curve: Fit) -> float:
+    """Return the share of Δχ² that a curve adds to what names explain where it acts; the curve is the last term.
+
+    What an inexact law leaves is a share of the law, reading by reading: a curve that the law itself hardly follows (a
+    shadow over the sun's azimuth, beside a delay of all strings) holds little of it, however much the law explains.
+    """
+    gain = with_curve.delta_chi2 - names.delta_chi2
+    if not names.terms or any(term.group.is_change for term in names.terms):
+        return law_misfit(equations, names, with_curve)
+    columns = with_curve.columns
+    first, last = len(equations.nuisance.columns), len(columns) - len(with_curve.terms[-1].group.columns)
+    matrix = equations.normal_matrix(with_curve)
+    inverse = pseudo_inverse(matrix[:first, :first], SINGULAR) if first else np.zeros((0, 0))
+    beside = matrix[first:, first:] - matrix[first:, :first] @ inverse @ matrix[:first, first:]
+    laws = slice(0, last - first)
+    along = beside[laws.stop :, laws] @ names.coefficients[first:]
+    held = float(along @ pseudo_inverse(beside[laws.stop :, laws.stop :], SINGULAR) @ along)
+    return gain / max(min(held, explained(equations, names)) + gain, 1e-9)
 
 
 def as_stated(equations: NormalEquations) -> NormalEquations:

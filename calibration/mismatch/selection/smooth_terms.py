@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.problem.covariates import quantity
+from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import (
@@ -19,7 +21,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     wheels_of_faulty_sensors,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
-from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
+from regolithd.calibration.mismatch.selection.law_misfit import law_misfit, misfit_beside
 from regolithd.calibration.mismatch.selection.slow_noise import (
     best_curve,
     lead_beside_slow_noise,
@@ -125,21 +127,39 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
     """Return the best smooth term beside the effects, if it is significant, large, and more than a law's misfit.
 
     `tolerated` is the share that is a law's misfit, by default `form_misfit`; none where parameters leave their priors
-    beside the effects: then it is not the law that is a little wrong.
+    beside the effects: then it is not the law that is a little wrong. Where the best one is of the prediction, which
+    follows what any law leaves, the best of another covariate is asked as well.
     """
     limits, faulty = equations.thresholds, wheels_of_faulty_sensors(named)
-    curves = best_of_each_smooth_term(equations, named.terms)
-    left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
-    curve = best_curve(equations, named.terms, left)
-    if curve is None:
-        return None
-    beside = equations.fit((*named.terms, curve))
-    if power_share(equations, beside, named) < limits.smooth_term_power:
-        return None
     if tolerated is None:
         leaving = equations.nuisance.leaving_their_priors(named, equations.problem)
         tolerated = 0.0 if leaving.size else limits.form_misfit
-    return None if named.terms and law_misfit(equations, named, beside) < tolerated else curve
+    curves = best_of_each_smooth_term(equations, named.terms)
+    left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
+    curve = best_curve(equations, named.terms, left)
+    if (
+        curve is not None
+        and not _is_a_finding(equations, named, curve, tolerated)
+        and _of_the_prediction(equations, curve)
+    ):
+        others = [(score, term) for score, term in left if not _of_the_prediction(equations, term)]
+        curve = best_curve(equations, named.terms, others)
+    return curve if curve is not None and _is_a_finding(equations, named, curve, tolerated) else None
+
+
+def _is_a_finding(equations: NormalEquations, named: Fit, curve: Term, tolerated: float) -> bool:
+    """Return whether a curve holds much of what effects leave, and more than this share as their laws' misfit."""
+    beside = equations.fit((*named.terms, curve))
+    if power_share(equations, beside, named) < equations.thresholds.smooth_term_power:
+        return False
+    misfit = law_misfit if _of_the_prediction(equations, curve) else misfit_beside
+    return not named.terms or misfit(equations, named, beside) >= tolerated
+
+
+def _of_the_prediction(equations: NormalEquations, curve: Term) -> bool:
+    """Return whether a curve is over the size of the prediction, or over its past."""
+    of_size = {"torque", quantity(equations.problem.simulation.channel)}
+    return curve.name in of_size | LAGGED
 
 
 def power_share(equations: NormalEquations, beside: Fit, named: Fit) -> float:

@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.simulation.user_code import array_of, called
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Array, Shape
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 LIBRARY = candidates.__name__
@@ -28,7 +29,7 @@ class CheckedCandidate(Candidate):
         for name in Candidate.__annotations__:
             setattr(self, name, getattr(inner, name))
         for name, method in vars(Candidate).items():
-            if inspect.isfunction(method) and not name.startswith("_") and name != "columns":
+            if inspect.isfunction(method) and not name.startswith("_") and name not in vars(CheckedCandidate):
                 setattr(self, name, partial(called, inner, name))
 
     @property  # type: ignore[misc]
@@ -43,6 +44,11 @@ class CheckedCandidate(Candidate):
         if name == "inner" or name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.inner, name)
+
+    def form_for(self, simulation: Predictor) -> Candidate:
+        """Return the candidate for a simulation, which is checked as this one is."""
+        found = called(self.inner, "form_for", simulation)
+        return self if found is self.inner else CheckedCandidate(found)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the columns for one shape, (column, time, wheel)."""

@@ -78,6 +78,9 @@ def test_an_offset_that_was_there_from_the_beginning_is_no_drift(offset_N: float
         ("flow_m3_s", "flow"),
         ("level", "level"),
         ("supply_voltage_mV", "supply_voltage"),
+        ("flow_L_min", "flow"),
+        ("oxygen_mg_L", "oxygen"),
+        ("speed_L_rad_s", "speed_L"),
     ],
 )
 def test_a_quantity_is_a_channel_without_its_unit(channel: str, name: str) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.errors import MismatchError, MissingColumnError
@@ -224,6 +225,58 @@ def test_candidates_of_the_library_are_as_they_are() -> None:
     assert type(found) is CheckedCandidate
     assert isinstance(found, Candidate)
     assert checked_candidate(found, "here") is found
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ('return -problem.covariates["torque"][None]', r"Loss\.columns \(.*loss\.py, line 18\): KeyError: 'torque'"),
+        ('return problem.covariates["level"]', r"Loss\.columns, .* must have shape \(1, 200, 1\), not \(200, 1\)"),
+    ],
+)
+def test_what_a_candidate_of_the_user_s_own_raises_is_told(tmp_path: Path, body: str, told: str) -> None:
+    """Through the whole comparison, in which a candidate is asked for its form for the simulation."""
+    (
+        tmp_path / "loss.py"
+    ).write_text(f"""from regolithd.calibration.mismatch import Candidate, Coefficient, Prior, Simulation
+
+
+class Loss(Candidate):
+    name, covariate = "own-loss", "level"
+    equation = "ΔP = -c P"
+    words = "a loss"
+    signature = "less"
+    experiment = "run it"
+    source = "test"
+    requires = ("level",)
+    along_motion = False
+    coefficients = (Coefficient("share", "1"),)
+
+
+
+    def columns(self, problem, shape):
+        {body}
+
+
+class Pump(Simulation):
+    channel, unit = "power_W", "W"
+    parameters = {{"gain": Prior(2.0, 0.1)}}
+
+    def predict(self, inputs, values):
+        return values["gain"] * inputs["level_m"]
+
+    def covariates(self, inputs):
+        return {{"level": inputs["level_m"]}}
+
+    def candidates(self, library):
+        return (*library, Loss())
+""")
+    (tmp_path / "SIM.toml").write_text('[simulation]\nmodel = "loss:Pump"\n')
+    rng = np.random.default_rng(0)
+    level = rng.uniform(1, 2, 200)
+    columns = {"t_s": np.arange(200.0), "level_m": level, "power_W": 2 * level + rng.normal(0, 0.1, 200)}
+    with pytest.raises(MismatchError, match=told):
+        compare(columns, load_simulation(tmp_path / "SIM.toml"))
 
 
 def test_values_at_which_a_prediction_fails_are_told(tmp_path: Path) -> None:
