@@ -21,6 +21,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     on_wheels,
     parameters_found,
     percent,
+    what_it_follows,
     without_name,
 )
 
@@ -154,11 +155,11 @@ def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, s
 
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
     """Return the line about what is unexplained, and those about its curve, indented."""
-    follows = f"{labels.the(rest.covariate)}{labels.period(rest)}"
+    follows = what_it_follows(rest, f"{labels.the(rest.covariate)}{labels.period(rest)}")
     where = "".join(f" in {each}" for each in (rest.channel if several else "", rest.told_where) if each)
     line = (
         f"unexplained{where}: {percent(rest.share_of_residual)} of the residual "
-        f"follows {follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
+        f"{follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
         f"{f'; only {rest.range.statement}' if rest.range else ''}"
     )
     return [line, *(f"  {each}" for each in _curve_lines(rest, labels))]

@@ -260,6 +260,14 @@ def after_number(unit: str) -> str:
     return f" {unit}" if unit not in {"", "1"} else ""
 
 
+def what_it_follows(place: Unexplained, covariate: str) -> str:
+    """Return what the residual does over a covariate (words): it follows that, or is a constant whatever that is."""
+    if place.curve is None or not place.curve.hardly_varies:
+        return f"follows {covariate}"
+    constants = {"gain": "a constant share of the prediction", "drag": "a constant along the motion"}
+    return f"is {constants.get(place.curve.coupling, 'a constant')} that hardly depends on {covariate}"
+
+
 def has_curve_of(place: Unexplained, before: Sequence[Unexplained]) -> bool:
     """Return whether the curve of what is unexplained was told with another range of it before."""
     return place.curve is not None and any(place.curve == other.curve for other in before)

@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 LEAST_TOLD = 0.0005
 """Relative change of an error below which it is told as none: percent have one decimal."""
+
+
+LEAST_VARIED = 0.1
+"""Deviation of a curve's values as a share of their mean, below which it is a constant (a choice: a law that is a
+little wrong deviates by as much)."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,17 @@ class EmpiricalCurve:
     high: tuple[float, ...]
     held_out_rmse_before: float
     held_out_rmse_after: float
+
+    @property
+    def hardly_varies(self) -> bool:
+        """Whether its values deviate from their mean by less than `LEAST_VARIED` of it (root mean square).
+
+        Values count by how well they are known.
+        """
+        width = np.maximum(np.subtract(self.high, self.low), 1e-300)
+        known, values = 1 / width**2, np.array(self.value)
+        mean = float(np.average(values, weights=known))
+        return bool(np.average((values - mean) ** 2, weights=known) < (LEAST_VARIED * mean) ** 2)
 
     @property
     def helps_held_out(self) -> bool:

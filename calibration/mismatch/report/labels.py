@@ -179,7 +179,8 @@ def _left_out_sentence(answer: Answer, labels: Labels) -> str:
     names = list(dict.fromkeys(labels.effect(effect.name) for effect in answer.effects))
     if answer.verdict == "missing-physics":
         return f"The simulation leaves out {listed(names)}." if names else ""
-    covariates = list(dict.fromkeys(labels.the(place.covariate) for place in answer.unexplained))
+    varied = [place for place in answer.unexplained if not (place.curve and place.curve.hardly_varies)]
+    covariates = list(dict.fromkeys(labels.the(place.covariate) for place in varied))
     place = f" that depends on {listed(covariates)}" if covariates else ""
     if names:
         return f"The simulation leaves out {listed(names)} – and something{place} that no known effect explains."

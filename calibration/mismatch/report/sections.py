@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     listed,
     percent,
     plural,
+    what_it_follows,
     without_name,
 )
 from regolithd.calibration.mismatch.report.axes import interval, number
@@ -252,6 +253,7 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
         labels.wheels(place.wheels, evidence.wheels),
         labels.from_to(place.from_s, place.to_s),
         f"{percent(place.share_of_residual)} of the residual’s power",
+        what_it_follows(place, "it") if place.curve and place.curve.hardly_varies else "",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
     name = labels.the(place.covariate) + labels.period(place)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter, Unexplained
 from regolithd.calibration.mismatch.candidates.cold_lubricant_friction import ColdLubricantFriction
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
 from regolithd.calibration.mismatch.candidates.load_dependent_efficiency import LoadDependentEfficiency
@@ -23,8 +23,10 @@ from regolithd.calibration.mismatch.inference.statements import (
     size_and_cost,
     statement,
     told,
+    what_it_follows,
     words_of,
 )
+from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Shape
@@ -170,3 +172,25 @@ def test_beside_something_unexplained_only_a_clear_distance_from_the_prior_is_a_
     )
     assert found.startswith("outlet had to leave its prior")
     assert notes_beside_priors([about, found, "a gap"], [beyond]) == ["a gap"]
+
+
+def unexplained_over(value: tuple[float, ...], coupling: str) -> Unexplained:
+    """Return something unexplained over the wind, with this curve."""
+    low, high = tuple(each - 0.02 for each in value), tuple(each + 0.02 for each in value)
+    curve = EmpiricalCurve(coupling, False, "1", "m/s", (1.0, 5.0, 9.0), value, low, high, 2.0, 1.0)
+    return Unexplained("power_W", ("east",), "wind", 0.0, 9.0, 0.8, curve=curve)
+
+
+@pytest.mark.parametrize(
+    ("value", "coupling", "told"),
+    [
+        ((-0.12, -0.121, -0.119), "gain", "is a constant share of the prediction that hardly depends on the wind"),
+        ((0.5, 0.51, 0.49), "offset", "is a constant that hardly depends on the wind"),
+        ((0.5, 0.51, 0.49), "drag", "is a constant along the motion that hardly depends on the wind"),
+        ((0.5, 0.7, 0.49), "offset", "follows the wind"),
+        ((0.3, 0.0, -0.3), "offset", "follows the wind"),
+    ],
+)
+def test_a_curve_that_hardly_varies_is_told_as_a_constant(value: tuple[float, ...], coupling: str, told: str) -> None:
+    """A constant is found over whichever covariate chance picks: the sentence does not say that it depends on that."""
+    assert what_it_follows(unexplained_over(value, coupling), "the wind") == told
