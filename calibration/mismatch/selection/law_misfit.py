@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
@@ -29,23 +30,32 @@ def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float
 
 
 def misfit_beside(equations: NormalEquations, names: Fit, with_curve: Fit) -> float:
-    """Return the share of Δχ² that a curve adds to what names explain where it acts; the curve is the last term.
+    """Return the share of Δχ² that a curve adds to names, those of delays as far as the curve can hold what they leave.
 
-    What an inexact law leaves is a share of the law, reading by reading: a curve that the law itself hardly follows (a
-    shadow over the sun's azimuth, beside a delay of all strings) holds little of it, however much the law explains.
+    What an inexact law leaves is a share of the law, reading by reading. A delay acts where the prediction changes, and
+    explains more than any load there: a curve that it hardly follows (a shadow over the sun's azimuth) holds little of
+    what its law misses, however much it explains. The curve is the last term.
     """
-    gain = with_curve.delta_chi2 - names.delta_chi2
-    if not names.terms or any(term.group.is_change for term in names.terms):
+    delays = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
+    if not delays or any(term.group.is_change for term in names.terms):
         return law_misfit(equations, names, with_curve)
-    columns = with_curve.columns
-    first, last = len(equations.nuisance.columns), len(columns) - len(with_curve.terms[-1].group.columns)
+    others = equations.fit([term for term in names.terms if term.name != SensorDelay.name])
+    gain, by_delays = with_curve.delta_chi2 - names.delta_chi2, names.delta_chi2 - others.delta_chi2
+    held = min(_held_by_last(equations, names, delays, with_curve), by_delays)
+    return gain / max(explained(equations, names) - by_delays + held + gain, 1e-9)
+
+
+def _held_by_last(equations: NormalEquations, names: Fit, which: Sequence[int], with_curve: Fit) -> float:
+    """Return the Δχ² that the last term of a fit has in common with some names, beside the free parameters."""
+    first, last = len(equations.nuisance.columns), len(with_curve.columns) - len(with_curve.terms[-1].group.columns)
     matrix = equations.normal_matrix(with_curve)
     inverse = pseudo_inverse(matrix[:first, :first], SINGULAR) if first else np.zeros((0, 0))
     beside = matrix[first:, first:] - matrix[first:, :first] @ inverse @ matrix[:first, first:]
-    laws = slice(0, last - first)
-    along = beside[laws.stop :, laws] @ names.coefficients[first:]
-    held = float(along @ pseudo_inverse(beside[laws.stop :, laws.stop :], SINGULAR) @ along)
-    return gain / max(min(held, explained(equations, names)) + gain, 1e-9)
+    size = np.zeros(last)
+    for index in which:
+        size[names.of_term(index)] = names.coefficients[names.of_term(index)]
+    common = beside[last - first :, : last - first] @ size[first:]
+    return float(common @ pseudo_inverse(beside[last - first :, last - first :], SINGULAR) @ common)
 
 
 def as_stated(equations: NormalEquations) -> NormalEquations:

@@ -41,7 +41,7 @@ def test_parameters_win_over_other_tables() -> None:
     [
         ({"tank": {"aera_m2": 0.6}}, "did you mean area_m2"),
         ({"tank": {"area_m2": "wide"}}, "[tank] area_m2: a finite number is needed, not 'wide'"),
-        ({"parameters": {"area_m2": 3}}, "[parameters.area_m2] takes value, std and unit"),
+        ({"parameters": {"area_m2": 3}}, "[parameters.area_m2] takes value, std, unit and own"),
         ({"parameters": {"area_m2": {"value": "x"}}}, "[parameters.area_m2] value: a finite number"),
         ({"parameters": {"volume": {}}}, "[parameters]: the simulation has no parameter volume"),
         ({"area_m2": 3}, "a parameter stands in a table"),
