@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 NEVER: tuple[float, tuple[Term, ...]] = (float("inf"), ())
+TRIED_BESIDE_A_CURVE = 3
+"""Names that are tried with a curve of their own beside them, in the place of a curve alone (a choice)."""
 LARGEST_MARGIN = 40.0
 """Margin beyond which an answer is no alternative: it is e^20 times less probable."""
 
@@ -260,7 +262,7 @@ def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
     """Yield the sets of terms with one less, one more, or one in another's place; of the names alone, too.
 
     A curve may hold what the wrong name beside it leaves: the right name needs none. And one curve may be what several
-    names imitate.
+    names imitate, or a name and another curve.
     """
     terms, named = decision.whole.terms, tuple(term for term in decision.whole.terms if term.group.named)
     if len(named) > 1:
@@ -268,6 +270,8 @@ def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
     for index in range(len(named)) if len(named) < len(terms) else ():
         rest = (*named[:index], *named[index + 1 :])
         yield from ((*rest, other) for other in _further(decision, rest))
+    for _, name in best_of_each_candidate(decision.equations, ())[: TRIED_BESIDE_A_CURVE if not named else 0]:
+        yield from ((name, curve) for _, curve in best_of_each_smooth_term(decision.equations, (name,))[:1])
     yield from ((*terms, more) for more in _further(decision, terms))
     for index in range(len(terms)):
         rest = (*terms[:index], *terms[index + 1 :])
