@@ -16,7 +16,13 @@ from regolithd.calibration.mismatch.answer import Change
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, late_inputs, lateness
+from regolithd.calibration.mismatch.candidates.sensor_delay import (
+    columns_of,
+    late_inputs,
+    lateness,
+    makes_late,
+    on_some,
+)
 from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
@@ -67,13 +73,14 @@ class Stated:
         SimulationError
             When the recording has not what the effect depends on, or the effect's shape or coefficients are incomplete.
         """
-        coefficients = times * np.array(self.contribution.coefficients, np.float64)
-        columns = np.where(problem.mask, self._columns(problem, coefficients.tolist()), 0.0)
+        found = times * np.array(self.contribution.coefficients, np.float64)
+        columns = np.where(problem.mask, self._columns(problem, found.tolist()), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
-        if len(coefficients) != len(columns):
+        if len(found) != len(columns):
             raise SimulationError(
-                f"[[effects]] {self.contribution.name}: {len(columns)} coefficients are needed, not {len(coefficients)}"
+                f"[[effects]] {self.contribution.name}: {len(columns)} coefficients are needed, not {len(found)}"
             )
+        coefficients = self.candidate.coefficients_here(problem, self.contribution.shape, found.tolist())
         return np.einsum("c,ctw,w->tw", coefficients, columns, on)
 
     def deviations(self, problem: Problem) -> tuple[Array, ...]:
@@ -254,7 +261,10 @@ def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
     """Return the problem whose prediction has the effects, with how well the size of each is known."""
     known = [(each.contribution.name, each.contribution.shape) for each in stated]
     recording = problem.recording.with_notes(*_notes_on_wheels(stated, problem.recording.wheels))
-    problem = replace(problem, recording=recording, late=lateness(known, problem.simulation.channel))
+    channel, wheels = problem.simulation.channel, problem.recording.wheels
+    on = [each.contribution.wheels for each, effect in zip(stated, known, strict=True) if makes_late(*effect, channel)]
+    late_on = on_some([wheels.index(wheel) for wheel in on[0] if wheel in wheels], len(wheels)) if on else ()
+    problem = replace(problem, recording=recording, late=lateness(known, channel), late_on=late_on)
     effects = tuple(
         StatedEffect(
             name=each.contribution.name,

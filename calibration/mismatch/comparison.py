@@ -355,11 +355,12 @@ def _searched_beside_delays(
     for _ in range(LATE_SEARCHES if decision.has_delay else 0):
         noise_size = decision.equations.problem.noise_size
         posed = pose(values, decision.late_inputs)
-        problem = replace(posed, late=decision.late or posed.late, noise_size=noise_size)
+        late, on = (decision.late, decision.late_on) if decision.late else (posed.late, posed.late_on)
+        problem = replace(posed, late=late, late_on=on, noise_size=noise_size)
         if decision.is_late_alone:
             fitted = fitted_where_late(problem, decision.late_inputs, posed.late[1] if posed.late else 0.0)
             values = fitted.values
-            problem = replace(pose(values, fitted.inputs), late=fitted.channel, noise_size=noise_size)
+            problem = replace(pose(values, fitted.inputs), late=fitted.channel, late_on=on, noise_size=noise_size)
         again = _search_at(smooth_equations(problem), found.candidates, progress)
         if not again.decision.has_delay:
             break

@@ -192,6 +192,10 @@ class Candidate:
         """Return the candidate in the form that it has for a simulation; by default it has only one."""
         return self
 
+    def coefficients_here(self, problem: Problem, shape: Shape, found: Sequence[float]) -> Sequence[float]:  # noqa: ARG002
+        """Return a corrected effect's coefficients as it acts in this recording; by default as they were found."""
+        return found
+
     def beside(self, corrected: Sequence[Shape]) -> Candidate | None:  # noqa: ARG002  # subclasses look
         """Return what is still looked for where the simulation was corrected by this effect on all wheels.
 

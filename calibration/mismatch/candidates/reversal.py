@@ -86,7 +86,7 @@ def _reversal(problem: Problem, found: Callable[[], Shape]) -> Shape:
         return np.array([float(best.get(key, 0.0)) for key in KEYS])
 
     # Copies of a problem share what was run once, and a copy may be late where the problem is not.
-    once = problem.run_once(f"reversal of the friction, late by {problem.late}", 0.0, values)
+    once = problem.run_once(f"reversal of the friction, late by {problem.late} on {problem.late_on}", 0.0, values)
     return {key: float(value) for key, value in zip(KEYS, once, strict=True) if value}
 
 

@@ -324,7 +324,11 @@ def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
     if problem.late is None or problem.late[1] == 0:
         return columns
     kind, delay = problem.late
-    return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay)) for column in columns]
+    late = [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay)) for column in columns]
+    if not problem.late_on:
+        return late
+    on = np.isin(np.arange(problem.mask.shape[1]), problem.late_on)
+    return [np.where(on, shifted, column) for shifted, column in zip(late, columns, strict=True)]
 
 
 def bridged(values: Array) -> Array:
@@ -349,6 +353,17 @@ def lateness(effects: Iterable[tuple[str, Shape]], channel: str) -> tuple[str, f
     None where none does.
     """
     for name, shape in effects:
-        if name == SensorDelay.name and shape.get("late") == channel:
+        if makes_late(name, shape, channel):
             return next(((kind, float(shape[kind])) for kind in OF_CHANNEL if kind in shape), None)
     return None
+
+
+def makes_late(name: str, shape: Shape, channel: str) -> bool:
+    """Return whether an effect makes a predicted channel late."""
+    return name == SensorDelay.name and shape.get("late") == channel
+
+
+def on_some(wheels: Iterable[int], count: int) -> tuple[int, ...]:
+    """Return the wheels on which a channel is late, by their indices; empty where these are all."""
+    found = tuple(sorted(set(wheels)))
+    return found if len(found) < count else ()

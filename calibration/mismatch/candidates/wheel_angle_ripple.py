@@ -9,10 +9,11 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.responses import Responses
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, columns_of
 from regolithd.calibration.mismatch.problem.covariates import angle_is_recorded
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.means import running_mean
+from regolithd.calibration.mismatch.signal.phase import shifted_to
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
@@ -169,6 +170,15 @@ class WheelAngleRipple(Candidate):
         has = amplitudes > NONE * np.max(amplitudes)  # a wheel that is not of the effect has coefficients of 0
         amplitude = float(np.sqrt(np.mean(amplitudes[has] ** 2))) if has.any() else 0.0
         return {"amplitude": amplitude, "order": float(shape["order"])}
+
+    def coefficients_here(self, problem: Problem, shape: Shape, found: Sequence[float]) -> Sequence[float]:
+        """Return the coefficients in the phase that this recording shows, where its angle begins anew."""
+        if angle_is_recorded(problem.recording, problem.covariates):
+            return found
+        residual = np.where(problem.mask, np.nan_to_num(problem.measured - problem.prediction), 0.0)
+        of_wheels = self.columns_of_wheels(shape, problem.mask.shape[1])
+        shifted = shifted_to(residual, columns_of(problem, self, shape), np.array(found), of_wheels)
+        return [float(each) for each in shifted]
 
     def columns_of_wheels(self, shape: Shape, wheels: int) -> NDArray[np.int64]:
         """Return the places of cosine and sine of each wheel, then those of the overtone."""

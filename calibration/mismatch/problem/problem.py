@@ -98,6 +98,7 @@ class Problem:
         `prediction` is of these
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
+    late_on: the wheels, by their indices, on which it is late; empty: on all
     fed_back: covariates that follow the channel's noise: no curve over them explains anything
     held: parameters that stay at their values, as the recording would move them out of their bounds; and, by the names
         that `tangents` gives them, sizes of corrected effects
@@ -126,6 +127,7 @@ class Problem:
     on_time: Mapping[str, float] = field(default_factory=dict)
     as_recorded: Array | None = None
     late: tuple[str, float] | None = None
+    late_on: tuple[int, ...] = ()
     fed_back: frozenset[str] = frozenset()
     held: frozenset[str] = frozenset()
     smoothed: Mapping[str, Array] = field(default_factory=dict, repr=False)

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import KINDS, SensorDelay, late_inputs, lateness
+from regolithd.calibration.mismatch.candidates.sensor_delay import (
+    KINDS,
+    SensorDelay,
+    late_inputs,
+    lateness,
+    makes_late,
+    on_some,
+)
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
@@ -113,6 +120,15 @@ class Decision:
         """How the predicted channel is late by a named effect, and by how much [s]; None: it is not."""
         named = [(term.name, self._shape_now(index, term)) for index, term in enumerate(self.named.terms)]
         return lateness(named, self.equations.problem.simulation.channel)
+
+    @property
+    def late_on(self) -> tuple[int, ...]:
+        """The wheels on which the predicted channel is late by a named effect; empty: on all, or on none."""
+        problem = self.equations.problem
+        for term in self.named.terms:
+            if makes_late(term.name, term.group.shape, problem.simulation.channel):
+                return on_some(term.wheels, problem.mask.shape[1])
+        return ()
 
     def _shape_now(self, index: int, term: Term) -> Shape:
         """Return the shape of a named term; of a corrected delay that has changed, with the delay that it has now."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.regression.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.causality import acts_forwards
@@ -52,7 +53,7 @@ def noise_left(equations: NormalEquations) -> Array:
     terms, nuisance = fit_of_significant_terms(equations).terms, equations.nuisance
     wide = nuisance.widened(nuisance.told(equations.problem), equations.problem)
     free = equations.with_nuisance(wide)
-    return residual_of(free, free.fit(terms))
+    return _about_its_mean(free, residual_of(free, free.fit(terms)))
 
 
 def _beyond_slow_noise(equations: NormalEquations, terms: Sequence[Term]) -> list[Term]:
@@ -94,7 +95,14 @@ def noise_of_whitened(design: DesignMatrix, residual: Array) -> NoiseModel:
 
 def _noise_beside(equations: NormalEquations, terms: Sequence[Term]) -> NoiseModel:
     """Return the noise of what these terms leave."""
-    return noise_of_whitened(equations.design, residual_of(equations, equations.fit(terms)))
+    left = _about_its_mean(equations, residual_of(equations, equations.fit(terms)))
+    return noise_of_whitened(equations.design, left)
+
+
+def _about_its_mean(equations: NormalEquations, residual: Array) -> Array:
+    """Return a residual [time, wheel] less the mean of each wheel: an offset is no noise, however slow noise may be."""
+    mask = equations.problem.mask
+    return residual - np.where(mask, known_mean(np.where(mask, residual, np.nan)), 0.0)
 
 
 def _most_significant(equations: NormalEquations, most: int, least_score: float) -> list[Term]:

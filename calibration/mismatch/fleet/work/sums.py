@@ -173,7 +173,7 @@ def _posed(
     inputs = inputs_of(recording, of_channel, thresholds, smoothed=smoothed)
     late = found.late_inputs
     problem = build_problem(recording, of_channel, found.values, inputs=inputs, late=late, thresholds=thresholds)
-    problem = replace(corrected_problem(problem, stated), late=found.late)
+    problem = replace(corrected_problem(problem, stated), late=found.late, late_on=found.late_on)
     if found.reversal is not None:
         keep_reversal(problem, found.reversal)
     return problem
