@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import (
     columns_of,
     late_inputs,
+    late_inputs_on,
     lateness,
     makes_late,
     on_some,
@@ -296,6 +297,13 @@ def stated_late_inputs(stated: Sequence[Stated], inputs: Sequence[str]) -> dict[
     return late_inputs(
         [(each.contribution.name, each.contribution.shape) for each in stated if not each.in_simulation], inputs
     )
+
+
+def stated_late_inputs_on(stated: Sequence[Stated], wheels: Sequence[int | str]) -> dict[str, tuple[int, ...]]:
+    """Return the wheels, by their indices, of those late inputs that a corrected simulation has late on some."""
+    effects = [each.contribution for each in stated if not each.in_simulation]
+    places = [[k for k, wheel in enumerate(wheels) if wheel in each.wheels] for each in effects]
+    return late_inputs_on([(each.name, each.shape, on) for each, on in zip(effects, places, strict=True)], len(wheels))
 
 
 def with_changes(problem: Problem, candidates: Sequence[Candidate], stated: Sequence[Stated]) -> tuple[Candidate, ...]:

@@ -6,6 +6,7 @@ recording, simulation ─▶ problem ─▶ equations ─▶ decision ─▶ ans
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.calibration.beside_delay import fitted_where_late
@@ -24,8 +25,14 @@ from regolithd.calibration.mismatch.calibration.linearised import (
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
-from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
+from regolithd.calibration.mismatch.candidates.sensor_delay import without_delays
+from regolithd.calibration.mismatch.changes import (
+    corrected_problem,
+    stated_in,
+    stated_late_inputs,
+    stated_late_inputs_on,
+    with_changes,
+)
 from regolithd.calibration.mismatch.channels import compare_channels, labelled
 from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
@@ -198,7 +205,7 @@ def decided(
             found, start = at_once, start_at_once
     if found.decision.late_inputs and len(found.decision.whole.terms) > 1:
         # An input that nearly repeats, late by much of what it repeats in, may stand for what has no name.
-        candidates = _without_delays(candidates, frozenset(found.decision.late_inputs))
+        candidates = without_delays(candidates, frozenset(found.decision.late_inputs))
         without, start_without = _settled(candidates, stated, pose, progress)
         if without.decision.is_as_probable_as(found.decision):
             found, start = without, start_without
@@ -227,12 +234,7 @@ def _settled(
         if not further | out | unknown | refused:
             return found, start
         pose = replace(pose, fed=pose.fed | further, held=pose.held | out, unknown=pose.unknown | unknown)
-        candidates = _without_delays(candidates, refused)
-
-
-def _without_delays(candidates: Sequence[Candidate], columns: frozenset[str]) -> list[Candidate]:
-    """Return the candidates without delays of some columns."""
-    return [each.without(columns) if isinstance(each, SensorDelay) else each for each in candidates]
+        candidates = without_delays(candidates, refused)
 
 
 def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:
@@ -296,12 +298,16 @@ class _Pose:
     unknown: frozenset[str] = frozenset()
     at_once: bool = False
 
-    def __call__(self, values: Mapping[str, float] | None, late: Mapping[str, float] | None = None) -> Problem:
-        """Return the problem at these values, or at the stated ones, with late inputs put on time [s]."""
-        late = {**self.on_time, **(late or {})}
-        problem = build_problem(
-            self.recorded, self.simulation, values, inputs=self.inputs, late=late, thresholds=self.thresholds
-        )
+    def __call__(
+        self,
+        values: Mapping[str, float] | None,
+        late: Mapping[str, float] | None = None,
+        late_on: Mapping[str, tuple[int, ...]] | None = None,
+    ) -> Problem:
+        """Return the problem at these or the stated values, late inputs put on time [s], on `late_on` if not on all."""
+        on = {**stated_late_inputs_on(self.stated, self.recorded.wheels), **(late_on or {})}
+        posed = partial(build_problem, inputs=self.inputs, late={**self.on_time, **(late or {})}, late_on=on)
+        problem = posed(self.recorded, self.simulation, values, thresholds=self.thresholds)
         return replace(
             corrected_problem(problem, self.stated),
             fed_back=self.fed,
@@ -354,13 +360,14 @@ def _searched_beside_delays(
     values = moved_values(decision.equations, decision.whole)
     for _ in range(LATE_SEARCHES if decision.has_delay else 0):
         noise_size = decision.equations.problem.noise_size
-        posed = pose(values, decision.late_inputs)
+        posed = pose(values, decision.late_inputs, decision.late_inputs_on)
         late, on = (decision.late, decision.late_on) if decision.late else (posed.late, posed.late_on)
         problem = replace(posed, late=late, late_on=on, noise_size=noise_size)
         if decision.is_late_alone:
             fitted = fitted_where_late(problem, decision.late_inputs, posed.late[1] if posed.late else 0.0)
             values = fitted.values
-            problem = replace(pose(values, fitted.inputs), late=fitted.channel, late_on=on, noise_size=noise_size)
+            posed = pose(values, fitted.inputs, decision.late_inputs_on)
+            problem = replace(posed, late=fitted.channel, late_on=on, noise_size=noise_size)
         again = _search_at(smooth_equations(problem), found.candidates, progress)
         if not again.decision.has_delay:
             break

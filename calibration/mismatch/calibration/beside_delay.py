@@ -126,7 +126,12 @@ class _LateSearch(Search):
         """Return the prediction without any delay, of inputs that are so late."""
         problem, recording = self.problem, self.problem.recording
         moved = {
-            name: shifted(recording, recording.channels[name], delay - problem.on_time[name])
+            name: shifted(
+                recording,
+                recording.channels[name],
+                delay - problem.on_time[name],
+                problem.on_time_on.get(name, ()),
+            )
             for name, delay in inputs.items()
             if delay != problem.on_time[name]
         }

@@ -215,7 +215,7 @@ def _change(problem: Problem, name: str, delay_s: float) -> Array:
     # Of several late inputs each has its own change, of the recording with those before it as they were recorded:
     # together they are what all of them change.
     before = list(problem.on_time)[: list(problem.on_time).index(name)] if already else []
-    recorded = {each: _moved(problem, each, -problem.on_time[each]) for each in before}
+    recorded = {each: _as_recorded(problem, each) for each in before}
 
     def moved(readings: float) -> Array:
         if not (readings or recorded):
@@ -233,6 +233,12 @@ def _change(problem: Problem, name: str, delay_s: float) -> Array:
 def _moved(problem: Problem, name: str, earlier_s: float) -> Array:
     """Return an input as it would have been recorded so much earlier [s], shape (time, wheel)."""
     return shifted(problem.recording, problem.recording.channels[name], earlier_s)
+
+
+def _as_recorded(problem: Problem, name: str) -> Array:
+    """Return an input that is put on time as it was recorded, shape (time, wheel)."""
+    values, late_s = problem.recording.channels[name], problem.on_time[name]
+    return shifted(problem.recording, values, -late_s, problem.on_time_on.get(name, ()))
 
 
 def _slope(problem: Problem, name: str) -> Array:
@@ -341,10 +347,21 @@ def bridged(values: Array) -> Array:
     return found
 
 
+def without_delays(candidates: Sequence[Candidate], columns: frozenset[str]) -> list[Candidate]:
+    """Return candidates without delays of some columns."""
+    return [each.without(columns) if isinstance(each, SensorDelay) else each for each in candidates]
+
+
 def late_inputs(effects: Iterable[tuple[str, Shape]], inputs: Sequence[str]) -> dict[str, float]:
     """Return how late each of these inputs is by some effects, names and shapes [s]."""
     shapes = [shape for name, shape in effects if name == SensorDelay.name and OF_INPUT in shape]
     return {str(shape["late"]): float(shape[OF_INPUT]) for shape in shapes if shape["late"] in inputs}
+
+
+def late_inputs_on(effects: Iterable[tuple[str, Shape, Sequence[int]]], count: int) -> dict[str, tuple[int, ...]]:
+    """Return the wheels of inputs that some effects, names, shapes and wheels, make late on some of so many."""
+    found = {str(shape["late"]): on_some(wheels, count) for name, shape, wheels in effects if OF_INPUT in shape}
+    return {name: wheels for name, wheels in found.items() if wheels}
 
 
 def lateness(effects: Iterable[tuple[str, Shape]], channel: str) -> tuple[str, float] | None:

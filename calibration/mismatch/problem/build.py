@@ -43,12 +43,13 @@ def build_problem(
     *,
     inputs: Inputs | None = None,
     late: Mapping[str, float] | None = None,
+    late_on: Mapping[str, tuple[int, ...]] | None = None,
     thresholds: Thresholds = THRESHOLDS,
 ) -> Problem:
     """Simulate the recording, with `values` for the parameters or as the simulation states them.
 
     `inputs` are those of the recording, where they have been prepared for other values before; `late` are inputs that
-    are put on time, and how late they were recorded [s].
+    are put on time, and how late they were recorded [s]; `late_on` has the wheels of those that are late on some.
 
     Raises
     ------
@@ -58,7 +59,7 @@ def build_problem(
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
     inputs = inputs or inputs_of(recording, simulation, thresholds)
     all_values = {**simulation.variants(), **chosen}
-    run = simulated(put_on_time(inputs, late) if late else inputs, simulation, all_values, thresholds)
+    run = simulated(put_on_time(inputs, late, late_on or {}) if late else inputs, simulation, all_values, thresholds)
     as_recorded = None
     if late:
         as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values) + bias_of(inputs.doubt)
@@ -110,6 +111,7 @@ def build_problem(
         thresholds=thresholds,
         doubt=inputs.doubt,
         on_time=dict(late or {}),
+        on_time_on=dict(late_on or {}),
         as_recorded=as_recorded,
         smoothed=inputs.smoothed,
     )

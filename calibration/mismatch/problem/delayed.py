@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.data.recording import Recording
 
 Array = NDArray[np.float64]
@@ -29,13 +31,18 @@ def filtered(recording: Recording, values: Array, time_constant_s: float) -> Arr
     return recursion(np.where(begins, 0.0, decay)[:, None], added)
 
 
-def shifted(recording: Recording, values: Array, by_s: float) -> Array:
-    """Return values (time, wheel) as they are `by_s` later in the same run, on straight lines; ends are held."""
+def shifted(recording: Recording, values: Array, by_s: float, on: Sequence[int] = ()) -> Array:
+    """Return values (time, wheel) as they are `by_s` later in the same run, on straight lines; ends are held.
+
+    `on` are the wheels that are shifted, by their indices; empty: all.
+    """
     moved = np.array(values, np.float64)
     for rows in recording.runs:
         at, of_run = recording.time_s[rows], values[rows]
         wanted, known = at + by_s, np.isfinite(of_run)
         for k, read in enumerate(known.T):
+            if on and k not in on:
+                continue
             if len(at) > 1 and read.all():
                 moved[rows, k] = np.interp(wanted, at, of_run[:, k])
             elif read.sum() > 1:

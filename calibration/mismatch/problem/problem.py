@@ -94,6 +94,7 @@ class Problem:
     noise_size: by how much the noise's deviation grows with the predicted size, shape (time, wheel); None: it does not,
         or it is not known yet
     on_time: how late inputs were recorded that are put on time here [s], by name
+    on_time_on: the wheels on which they are, by their indices, of those that are late on some
     as_recorded: where some are, the prediction from the inputs as they were recorded, without stated effects; None:
         `prediction` is of these
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
@@ -125,6 +126,7 @@ class Problem:
     doubt: InputDoubt | None = None
     noise_size: Array | None = None
     on_time: Mapping[str, float] = field(default_factory=dict)
+    on_time_on: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     as_recorded: Array | None = None
     late: tuple[str, float] | None = None
     late_on: tuple[int, ...] = ()

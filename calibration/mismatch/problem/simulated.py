@@ -174,24 +174,27 @@ def _carries_over_gaps(
     return bool(carried_over_gaps(recording, np.isfinite(predicted()) & (moved != predicted())).any())
 
 
-def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
+def put_on_time(inputs: Inputs, late: Mapping[str, float], on: Mapping[str, tuple[int, ...]]) -> Inputs:
     """Return the inputs with some of their columns as they would have been recorded without their delay [s].
 
-    What they were at the end of each run was not recorded any more.
+    What they were at the end of each run was not recorded any more. `on` has the wheels of those that are late on some.
     """
 
     def moved(recording: Recording) -> Recording:
-        columns = {name: shifted(recording, recording.channels[name], delay) for name, delay in late.items()}
+        columns = {
+            name: shifted(recording, recording.channels[name], delay, on.get(name, ())) for name, delay in late.items()
+        }
         return recording.with_channels(**columns)
 
     others = (inputs.bridged_otherwise, inputs.otherwise_in_gaps)
     otherwise, in_gaps = (None if other is None else moved(other) for other in others)
     blanks = {
-        name: shifted(inputs.expected, blank.astype(np.float64), late.get(name, 0.0)) > 0
+        name: shifted(inputs.expected, blank.astype(np.float64), late.get(name, 0.0), on.get(name, ())) > 0
         for name, blank in inputs.blanks.items()
     }
     for name, delay in late.items():
-        blanks[name] = blanks.get(name, False) | beyond_the_end(inputs.expected, delay)
+        some = np.isin(np.arange(inputs.expected.shape[1]), on[name]) if on.get(name) else True
+        blanks[name] = blanks.get(name, False) | (beyond_the_end(inputs.expected, delay) & some)
     return replace(
         inputs,
         as_read=moved(inputs.as_read),

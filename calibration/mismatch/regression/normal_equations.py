@@ -247,10 +247,17 @@ class NormalEquations:
         return Gains(wanted, sets, np.where(gains > 0, counted, 0.0))
 
     def _may_share(self, groups: Sequence[Group]) -> NDArray[np.bool_]:
-        """Return which sets of wheels may share which groups, shape (set, group)."""
-        alone = len(self.weights) == 1
+        """Return which sets of wheels may share which groups, shape (set, group).
+
+        The delay of an input that is put on time on some wheels changes nothing on the others, and is not theirs.
+        """
+        alone, on_some = len(self.weights) == 1, self.problem.on_time_on
         kinds = {kind: [alone or group.may_be_shared(kind) for group in groups] for kind in KINDS}
-        return np.array([kinds[kind] for kind in self.wheel_sets.values()])
+        shared = np.array([kinds[kind] for kind in self.wheel_sets.values()])
+        late = [on_some.get(str(group.shape.get("late")), self.all_wheels) for group in groups] if on_some else []
+        for place, wheels in enumerate(late):
+            shared[:, place] &= [set(wheels).issuperset(one) for one in self.wheel_sets]
+        return shared
 
     def _batches(self, groups: Sequence[Group], at: Index) -> list[Batch]:
         """Return the groups in batches of equally many columns, which are among those at `at`."""

@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import (
     KINDS,
     SensorDelay,
     late_inputs,
+    late_inputs_on,
     lateness,
     makes_late,
     on_some,
@@ -180,6 +181,12 @@ class Decision:
         """Inputs of the simulation that are late by a named effect, and by how much [s]."""
         named = [(term.name, term.group.shape) for term in self.named.terms if not term.group.is_change]
         return late_inputs(named, self.equations.problem.simulation.inputs)
+
+    @property
+    def late_inputs_on(self) -> dict[str, tuple[int, ...]]:
+        """The wheels, by their indices, of those of the late inputs that are late on some."""
+        named = [(term.name, term.group.shape, term.wheels) for term in self.named.terms if not term.group.is_change]
+        return late_inputs_on(named, self.equations.problem.mask.shape[1])
 
     def refused_delays(self, stated: Problem) -> frozenset[str]:
         """Return columns that were searched beside their delays, of which none has a name in the end.

@@ -71,8 +71,9 @@ class Found:
     Attributes
     ----------
     findings: as `regolithd mismatch` has them for this recording alone
-    values, late_inputs, late, late_on: the parameters at which the simulation was linearised, which inputs were put on
-        time there and by how much [s], how the predicted channel is late, and on which wheels: as in `Problem`
+    values, late_inputs, late_inputs_on, late, late_on: the parameters at which the simulation was linearised, which
+        inputs were put on time there, by how much [s] and on which wheels, and how, and on which wheels, the predicted
+        channel is late: as in `Problem`
     deviation, autocorrelation_times: of the noise beside all that was found, shape (wheel,)
     noise_floor: root mean square of what all that was found leaves
     entry_threshold: score above which an effect was named
@@ -94,6 +95,7 @@ class Found:
     shapes: dict[str, Shapes]
     labels: dict[str, str] = field(default_factory=dict)
     late_inputs: dict[str, float] = field(default_factory=dict)
+    late_inputs_on: dict[str, tuple[int, ...]] = field(default_factory=dict)
     late: tuple[str, float] | None = None
     late_on: tuple[int, ...] = ()
     responses: dict[str, Responses] = field(default_factory=dict)
@@ -133,6 +135,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         shapes=shapes_in(problem, of_recording.candidates),
         labels=dict(problem.labels),
         late_inputs=dict(problem.on_time),
+        late_inputs_on=dict(problem.on_time_on),
         late=problem.late,
         late_on=problem.late_on,
         responses=_responses(decision, of_recording.applicable),

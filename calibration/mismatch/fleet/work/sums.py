@@ -172,7 +172,15 @@ def _posed(
     smoothed = {name: values.astype(np.float64) for name, values in found.smoothed.items()}
     inputs = inputs_of(recording, of_channel, thresholds, smoothed=smoothed)
     late = found.late_inputs
-    problem = build_problem(recording, of_channel, found.values, inputs=inputs, late=late, thresholds=thresholds)
+    problem = build_problem(
+        recording,
+        of_channel,
+        found.values,
+        inputs=inputs,
+        late=late,
+        late_on=found.late_inputs_on,
+        thresholds=thresholds,
+    )
     problem = replace(corrected_problem(problem, stated), late=found.late, late_on=found.late_on)
     if found.reversal is not None:
         keep_reversal(problem, found.reversal)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
@@ -75,3 +76,34 @@ def test_a_shadow_beside_a_delay_that_explains_far_more_is_told() -> None:
     assert [effect.name for effect in answer.effects] == ["sensor-delay"]
     (place,) = answer.unexplained
     assert (place.covariate, place.wheels) == ("azimuth", ("east",))
+
+
+def on_one_string(*, late_input: bool, lost: float, seed: int = 3) -> Answer:
+    """Return the answer where one string's meter, or its sensor of the sun, is late, and another loses a constant."""
+    rng, rows = np.random.default_rng(seed), 1500
+    sun = np.clip(0.6 + filtered(rng.normal(0, 1.0, (rows, 3)), 8), 0.1, 1.0)
+    power = 5020 * sun + rng.normal(0, 40, sun.shape)
+    power[:, 2] -= lost
+    recorded = sun.copy()
+    late = recorded if late_input else power
+    late[3:, 0] = late[:-3, 0].copy()
+    columns = {
+        "t_s": np.repeat(60.0 * np.arange(rows), 3),
+        "string": np.tile(("east", "roof", "west"), rows),
+        "power_W": power.ravel(),
+        "sun": recorded.ravel(),
+        "azimuth_deg": np.repeat(np.linspace(90, 270, rows), 3),
+    }
+    return compare(columns, Strings()).answer
+
+
+@pytest.mark.parametrize("late_input", [False, True])
+@pytest.mark.parametrize("lost", [0.0, 200.0])
+def test_what_is_late_on_one_string_leaves_the_others_on_time(late_input: bool, lost: float) -> None:
+    """The delay is that of its string; what another loses is told beside it, and nothing where nothing is."""
+    answer = on_one_string(late_input=late_input, lost=lost)
+    (effect,) = answer.effects
+    assert (effect.name, effect.wheels) == ("sensor-delay", ("east",))
+    assert effect.shape["late"] == ("sun" if late_input else "power_W")
+    assert effect.parameters["delay_s"].value == pytest.approx(180, abs=15)
+    assert [place.wheels for place in answer.unexplained] == ([("west",)] if lost else [])
