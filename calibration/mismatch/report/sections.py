@@ -82,7 +82,7 @@ class EffectSection:
 class UnexplainedSection:
     """One structure in the residual that no candidate explains; `above`: its curve is drawn with another range."""
 
-    covariate: str
+    title: str
     facts: tuple[str, ...]
     empirical: EmpiricalSection | None = None
     above: bool = False
@@ -253,11 +253,12 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
         labels.wheels(place.wheels, evidence.wheels),
         labels.from_to(place.from_s, place.to_s),
         f"{percent(place.share_of_residual)} of the residual’s power",
-        what_it_follows(place, "it") if place.curve and place.curve.hardly_varies else "",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
-    name = labels.the(place.covariate) + labels.period(place)
-    return UnexplainedSection(name, tuple(unbroken(fact) for fact in facts if fact), curve)
+    covariate = labels.the(place.covariate) + labels.period(place)
+    constant = place.curve is not None and place.curve.hardly_varies
+    title = f"I{what_it_follows(place, covariate)[1:]}" if constant else f"Depends on {covariate}"
+    return UnexplainedSection(title, tuple(unbroken(fact) for fact in facts if fact), curve)
 
 
 def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:
