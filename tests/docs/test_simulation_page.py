@@ -104,7 +104,7 @@ def test_the_whole_example_names_what_its_recording_conceals(fans: dict[str, Any
     assert (clogging.wheels, friction.wheels) == (("exhaust", "supply"), ("supply",))
     assert clogging.statement.startswith("A filter whose resistance grows with time, on both fans: ")
     loss = clogging.parameters["loss_per_second"]
-    assert loss.low < -0.02 < loss.high
+    assert loss.low < 0.02 < loss.high
     assert loss.unit == "Pa s⁵/m⁶"
     assert friction.parameters["viscous_coefficient"].unit == "A/rpm^p"
     told = [*answer.notes, *(one.experiment for one in answer.indistinguishable)]
