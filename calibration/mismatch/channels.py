@@ -56,7 +56,8 @@ def compare_channels(simulation: Simulation, channels: Sequence[str], of_channel
     found = dict(alone)
     for channel, one in alone.items():
         others = [other.answer for name, other in alone.items() if name != channel]
-        if known := priors_from_others(one.answer, others):
+        known = priors_from_others(one.answer, others)
+        if known := {name: each for name, each in known.items() if name in simulation.parameters}:
             found[channel] = of_channel(channel, {**near[channel], **known})
     return _merged(list(found.values()), simulation, may_release=False)
 
@@ -119,7 +120,8 @@ def _merged(comparisons: Sequence[Comparison], simulation: Simulation, *, may_re
     """
     posterior = _joint(comparisons, simulation, may_release=may_release)
     common = posterior.parameters(simulation.parameters)
-    own = [one for each in comparisons for one in each.answer.parameters if one.name not in simulation.parameters]
+    told = [one for each in comparisons for one in each.answer.parameters if one.name not in simulation.parameters]
+    own = {one.name: one for one in reversed(told)}.values()  # of one wheel, as the first channel has it
     answer = merged_answers([each.answer for each in comparisons], (*common, *own))
     first, *others = (each.evidence for each in comparisons)
     # As in one channel: the terms of named effects, then those of changes.

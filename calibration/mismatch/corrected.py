@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Effect, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, Effect, Evidence
     from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
@@ -56,24 +56,26 @@ def write_corrected(
     # Beside something unexplained the answer's parameters are those of the fit that has it: others would imitate it.
     imitating = bool(answer.unexplained)
     common = {each.name: each.value for each in answer.parameters if each.name in simulation.parameters}
-    deviations = {each.name: each.value - common[of] for each, of in _of_wheels(answer, simulation)}
+    deviations = deviations_of(answer, simulation)
     values: Mapping[str, float] = {**evidence.values, **common, **deviations}
     curves: list[StatedCurve] = []
     if empirical and answer.unexplained:
         values, terms, curves = with_curves(answer, evidence)
         imitating = False
     new = corrected_tables(tables, simulation, values, terms, answer.effects, within_priors=imitating, curves=curves)
-    write_simulation(path, simulation, _with_own(new, simulation, deviations))
+    write_simulation(path, simulation, with_deviations(new, simulation, deviations))
 
 
-def _of_wheels(answer: Answer, simulation: Simulation) -> list[tuple[CalibratedParameter, str]]:
-    """Return what the answer tells of single wheels' own values, with the parameter of which each is one."""
-    own = sorted(simulation.own_to_each_wheel)
-    pairs = [(each, name) for each in answer.parameters for name in own if each.name.startswith(own_name(name, ""))]
-    return [(each, name) for each, name in pairs if each.name not in simulation.parameters]
+def deviations_of(answer: Answer, simulation: Simulation) -> dict[str, float]:
+    """Return the deviations of single wheels that an answer tells, by the names of their own values."""
+    common = {each.name: each.value for each in answer.parameters if each.name in simulation.parameters}
+    pairs = [(each, name) for each in answer.parameters for name in common if each.name.startswith(own_name(name, ""))]
+    return {each.name: each.value - common[of] for each, of in pairs if each.name not in common}
 
 
-def _with_own(tables: Mapping[str, Any], simulation: Simulation, deviations: Mapping[str, float]) -> dict[str, Any]:
+def with_deviations(
+    tables: Mapping[str, Any], simulation: Simulation, deviations: Mapping[str, float]
+) -> dict[str, Any]:
     """Return SIM.toml's tables with the wheels' deviations that were stated or found, where `[parameters]` has them."""
     stated = dict(tables.get("parameters", {}))
     for name in simulation.own_to_each_wheel & set(stated):

@@ -183,7 +183,10 @@ def compare_fleet(
     rows = tuple(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
-    answer = answers[0] if len(answers) == 1 else replace(joined(answers), parameters=joint_parameters(compared))
+    told = [each for one in answers for each in one.parameters if each.name not in simulation.parameters]
+    own = {(each.name, each.rovers): each for each in reversed(told)}.values()  # as the first channel has it
+    together = answers[0].parameters if len(answers) == 1 else (*joint_parameters(compared), *own)
+    answer = replace(answers[0] if len(answers) == 1 else joined(answers), parameters=together)
     units = {channel: chosen.simulation.unit for channel, chosen in zip(channels, compared, strict=True)}
     wheels = tuple(dict.fromkeys(wheel for chosen in compared for wheel in chosen.equations.wheels))
     acting = tuple(

@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.contribution import Contribution
-from regolithd.calibration.mismatch.corrected import corrected_tables, stated_tables, write_simulation
+from regolithd.calibration.mismatch.corrected import (
+    corrected_tables,
+    deviations_of,
+    stated_tables,
+    with_deviations,
+    write_simulation,
+)
 from regolithd.calibration.mismatch.errors import MismatchError
 
 if TYPE_CHECKING:
@@ -70,9 +76,10 @@ def write_corrected(path: Path, answer: FleetAnswer, told: Sequence[Told], simul
         raise MismatchError(
             f"a corrected simulation is of one rover, and these are {len(answer.rovers)}: compare the recordings of one"
         )
-    tables, values = stated_tables(simulation), {each.name: each.value for each in answer.parameters}
+    tables, deviations = stated_tables(simulation), deviations_of(answer, simulation)
+    values = {each.name: each.value for each in answer.parameters} | deviations
     terms, effects = [term for term, _ in told], [effect for _, effect in told]
     # Beside something unexplained parameters may stand for a part of it.
     imitating = bool(answer.unexplained)
     new = corrected_tables(tables, simulation, values, terms, effects, within_priors=imitating)
-    write_simulation(path, simulation, new)
+    write_simulation(path, simulation, with_deviations(new, simulation, deviations))

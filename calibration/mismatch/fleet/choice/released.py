@@ -35,10 +35,18 @@ def with_released(
     again, count, out = beside.fit(fit.terms), len(equations.tangents), set[int]()
     factors = equations.parameter_factors[1]
     for first in range(0, len(factors), max(count, 1)):
-        if unexplained.isdisjoint(np.flatnonzero(factors[first].any(axis=1)).tolist()):
-            names = joint_posterior(priors, [_information(beside, again, first, priors)]).released
-            out |= {first + equations.tangents.index(name) for name in names}
+        recordings = np.flatnonzero(factors[first].any(axis=1)).tolist()
+        names = set(_own_values([found[each] for each in recordings], priors))
+        if unexplained.isdisjoint(recordings):
+            names |= set(joint_posterior(priors, [_information(beside, again, first, priors)]).released)
+        out |= {first + equations.tangents.index(name) for name in names if name in equations.tangents}
     return replace(equations, released=frozenset(out)) if out else equations
+
+
+def _own_values(found: Sequence[Found], priors: Mapping[str, Prior]) -> list[str]:
+    """Return the names of wheels' own values that are a finding in more than half of some recordings by themselves."""
+    names = [each.name for one in found for each in one.findings.parameters if each.name not in priors]
+    return [name for name in dict.fromkeys(names) if 2 * names.count(name) > len(found)]
 
 
 def _information(equations: FleetEquations, fit: FleetFit, first: int, priors: Mapping[str, Prior]) -> Information:

@@ -26,9 +26,11 @@ from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
 from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
+from regolithd.calibration.mismatch.problem.prior import own_name
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -290,7 +292,27 @@ def _parameters(chosen: Chosen, beside: Beside) -> tuple[FleetParameter, ...]:
             found.append(
                 FleetParameter(name, prior.unit, prior.value, prior.std, value, value - reach, value + reach, rovers)
             )
+        common = {each.name: each.value for each in found if each.rovers == rovers}
+        found += _own_values(chosen, beside, place, rovers, common)
     return tuple(found)
+
+
+def _own_values(
+    chosen: Chosen, beside: Beside, place: int, rovers: tuple[str, ...], common: Mapping[str, float]
+) -> list[FleetParameter]:
+    """Return the wheels' own values that are a finding, beside the common values of the parameters' owner."""
+    equations, told = chosen.equations, []
+    first = place * len(equations.tangents)
+    for at in sorted(equations.released):
+        name = equations.tangents[at - first] if first <= at < first + len(equations.tangents) else ""
+        of = next((each for each in chosen.simulation.own_to_each_wheel if name.startswith(own_name(each, ""))), None)
+        if of is None or name in common:
+            continue
+        prior = chosen.simulation.parameters[of]
+        value, reach = common[of] + float(beside.fit.coefficients[at]), NINETY_PERCENT_STDS * float(beside.stds[at])
+        std = prior.of_one_wheel(THRESHOLDS.own_share).std
+        told.append(FleetParameter(name, prior.unit, common[of], std, value, value - reach, value + reach, rovers))
+    return told
 
 
 def _noise_floor(chosen: Chosen) -> float:

@@ -90,6 +90,40 @@ def test_one_string_that_gives_less_is_a_finding_of_its_own(stated: Path) -> Non
     assert abs(common.value - 5000) < 240  # it does not move to the mean of all three
 
 
+TWO = """
+
+class Two(Strings):
+    channels = {"power_W": "W", "grid_W": "W"}
+
+    def predict(self, inputs, values):
+        power = Strings.predict(self, inputs, values)
+        return {"power_W": power, "grid_W": 0.9 * power}
+"""
+
+
+def test_two_columns_tell_it_once(stated: Path) -> None:
+    """Both know the string's own value; the other column does not take it for a parameter of the simulation."""
+    stated.with_name("strings.py").write_text(MODULE + TWO)
+    stated.write_text(STATED.replace(":Strings", ":Two"))
+    table = dict(recorded(2, 0.9))
+    table["grid_W"] = 0.9 * table["power_W"] + np.random.default_rng(0).normal(0, 40, len(table["t_s"]))
+    answer = compare(table, load_simulation(stated)).answer
+    assert [each.name for each in answer.parameters] == ["peak_W", "idle_W", "peak_W of east"]
+    assert answer.verdict == "missing-physics"
+
+
+def test_a_season_of_recordings_tells_it_and_carries_it_over(stated: Path) -> None:
+    """More than half of a rover's recordings show it by themselves: it is released in all of them together."""
+    corrected = stated.with_name("NEW.toml")
+    found = compare([recorded(seed, 0.9) for seed in (2, 4, 6)], load_simulation(stated))
+    assert found.answer.verdict == "missing-physics"
+    (own,) = [each for each in found.answer.parameters if each.name == "peak_W of east"]
+    (common,) = [each for each in found.answer.parameters if each.name == "peak_W"]
+    assert own.value == pytest.approx(0.9 * common.value, rel=0.03)
+    found.write_corrected(corrected)
+    assert compare(recorded(8, 0.9), load_simulation(corrected)).answer.verdict == "consistent"
+
+
 def test_a_corrected_simulation_has_it_and_tells_when_it_is_gone(stated: Path) -> None:
     """The same string later is consistent; the string repaired has its own value again."""
     found, corrected = compared(stated, 2, east=0.9), stated.with_name("NEW.toml")
