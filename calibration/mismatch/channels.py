@@ -16,6 +16,8 @@ from regolithd.calibration.mismatch.inference.several_channels import (
     merged_answers,
     no_surer_than_before,
     nothing_else_is_wrong,
+    of_all_wheels,
+    of_single_wheels,
     priors_from_others,
 )
 
@@ -53,11 +55,10 @@ def compare_channels(simulation: Simulation, channels: Sequence[str], of_channel
             sure = [no_surer_than_before(answer, one.answer) for answer, one in zip(answers, again, strict=True)]
             again = [replace(one, answer=answer) for one, answer in zip(again, sure, strict=True)]
             return _merged(again, simulation)
-    found = dict(alone)
-    for channel, one in alone.items():
-        others = [other.answer for name, other in alone.items() if name != channel]
-        known = priors_from_others(one.answer, others)
-        if known := {name: each for name, each in known.items() if name in simulation.parameters}:
+    found, common = dict(alone), {name: of_all_wheels(one.answer, simulation.parameters) for name, one in alone.items()}
+    for channel in alone:
+        others = [common[name] for name in alone if name != channel]
+        if known := priors_from_others(common[channel], others):
             found[channel] = of_channel(channel, {**near[channel], **known})
     return _merged(list(found.values()), simulation, may_release=False)
 
@@ -120,9 +121,9 @@ def _merged(comparisons: Sequence[Comparison], simulation: Simulation, *, may_re
     """
     posterior = _joint(comparisons, simulation, may_release=may_release)
     common = posterior.parameters(simulation.parameters)
-    told = [one for each in comparisons for one in each.answer.parameters if one.name not in simulation.parameters]
-    own = {one.name: one for one in reversed(told)}.values()  # of one wheel, as the first channel has it
-    answer = merged_answers([each.answer for each in comparisons], (*common, *own))
+    answers = [each.answer for each in comparisons]
+    told = (parameter for each in answers for parameter in each.parameters)
+    answer = merged_answers(answers, (*common, *of_single_wheels(told, simulation.parameters)))
     first, *others = (each.evidence for each in comparisons)
     # As in one channel: the terms of named effects, then those of changes.
     named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]

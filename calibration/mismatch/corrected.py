@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes, with_curves
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.problem.prior import own_name, parted_own_name
 from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 from regolithd.calibration.mismatch.simulation.corrected_curves import TABLE, entry_of, stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects as stated_effects  # noqa: PLC0414  # for its users
@@ -68,22 +68,24 @@ def write_corrected(
 
 def deviations_of(answer: Answer, simulation: Simulation) -> dict[str, float]:
     """Return the deviations of single wheels that an answer tells, by the names of their own values."""
-    common = {each.name: each.value for each in answer.parameters if each.name in simulation.parameters}
-    pairs = [(each, name) for each in answer.parameters for name in common if each.name.startswith(own_name(name, ""))]
-    return {each.name: each.value - common[of] for each, of in pairs if each.name not in common}
+    values, found = {each.name: each.value for each in answer.parameters}, {}
+    for name in values.keys() - simulation.parameters:
+        if of := parted_own_name(name, simulation.parameters):
+            found[name] = values[name] - values[of[0]]
+    return found
 
 
 def with_deviations(
     tables: Mapping[str, Any], simulation: Simulation, deviations: Mapping[str, float]
 ) -> dict[str, Any]:
     """Return SIM.toml's tables with the wheels' deviations that were stated or found, where `[parameters]` has them."""
-    stated = dict(tables.get("parameters", {}))
-    for name in simulation.own_to_each_wheel & set(stated):
-        own, begins = dict(simulation.parameters[name].own), own_name(name, "")
-        own |= {each.removeprefix(begins): value for each, value in deviations.items() if each.startswith(begins)}
-        if own:
-            stated[name] = {**stated[name], OWN: own}
-    return {**tables, "parameters": stated} if stated else dict(tables)
+    own = {name: dict(prior.own) for name, prior in simulation.parameters.items()}
+    for name, deviation in deviations.items():
+        if of := parted_own_name(name, own):
+            own[of[0]][of[1]] = deviation
+    stated = tables.get("parameters", {})
+    told = {name: {**table, OWN: own[name]} for name, table in stated.items() if own.get(name)}
+    return {**tables, "parameters": {**stated, **told}} if told else dict(tables)
 
 
 def stated_tables(simulation: Simulation) -> dict[str, Any]:

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.search import Search
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown, moved_input
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.delayed import shifted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -126,12 +125,7 @@ class _LateSearch(Search):
         """Return the prediction without any delay, of inputs that are so late."""
         problem, recording = self.problem, self.problem.recording
         moved = {
-            name: shifted(
-                recording,
-                recording.channels[name],
-                delay - problem.on_time[name],
-                problem.on_time_on.get(name, ()),
-            )
+            name: moved_input(problem, name, delay - problem.on_time[name])
             for name, delay in inputs.items()
             if delay != problem.on_time[name]
         }

@@ -215,12 +215,12 @@ def _change(problem: Problem, name: str, delay_s: float) -> Array:
     # Of several late inputs each has its own change, of the recording with those before it as they were recorded:
     # together they are what all of them change.
     before = list(problem.on_time)[: list(problem.on_time).index(name)] if already else []
-    recorded = {each: _as_recorded(problem, each) for each in before}
+    recorded = {each: moved_input(problem, each, -problem.on_time[each]) for each in before}
 
     def moved(readings: float) -> Array:
         if not (readings or recorded):
             return problem.filled
-        further = {**recorded, name: _moved(problem, name, readings * step)}
+        further = {**recorded, name: moved_input(problem, name, readings * step)}
         known_as = f"{name} late, and {before} as recorded" if before else f"{name} late"
         return problem.run_once(known_as, already + readings * step, lambda: problem.with_inputs(further))
 
@@ -230,15 +230,13 @@ def _change(problem: Problem, name: str, delay_s: float) -> Array:
     return np.asarray(found - (problem.as_simulated if already else problem.filled))
 
 
-def _moved(problem: Problem, name: str, earlier_s: float) -> Array:
-    """Return an input as it would have been recorded so much earlier [s], shape (time, wheel)."""
-    return shifted(problem.recording, problem.recording.channels[name], earlier_s)
+def moved_input(problem: Problem, name: str, earlier_s: float) -> Array:
+    """Return an input as it would have been recorded so much earlier [s], shape (time, wheel).
 
-
-def _as_recorded(problem: Problem, name: str) -> Array:
-    """Return an input that is put on time as it was recorded, shape (time, wheel)."""
-    values, late_s = problem.recording.channels[name], problem.on_time[name]
-    return shifted(problem.recording, values, -late_s, problem.on_time_on.get(name, ()))
+    One that is put on time on some wheels, on these.
+    """
+    values, on = problem.recording.channels[name], problem.on_time_on.get(name, ())
+    return shifted(problem.recording, values, earlier_s, on)
 
 
 def _slope(problem: Problem, name: str) -> Array:

@@ -29,7 +29,7 @@ from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of, p
 from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
-from regolithd.calibration.mismatch.inference.several_channels import joined
+from regolithd.calibration.mismatch.inference.several_channels import joined, of_single_wheels
 from regolithd.calibration.mismatch.inference.statements import noun_of
 from regolithd.calibration.mismatch.report.labels import Labels
 
@@ -183,10 +183,11 @@ def compare_fleet(
     rows = tuple(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
-    told = [each for one in answers for each in one.parameters if each.name not in simulation.parameters]
-    own = {(each.name, each.rovers): each for each in reversed(told)}.values()  # as the first channel has it
-    together = answers[0].parameters if len(answers) == 1 else (*joint_parameters(compared), *own)
-    answer = replace(answers[0] if len(answers) == 1 else joined(answers), parameters=together)
+    answer = answers[0]
+    if len(answers) > 1:
+        told = (parameter for each in answers for parameter in each.parameters)
+        together = (*joint_parameters(compared), *of_single_wheels(told, simulation.parameters))
+        answer = replace(joined(answers), parameters=together)
     units = {channel: chosen.simulation.unit for channel, chosen in zip(channels, compared, strict=True)}
     wheels = tuple(dict.fromkeys(wheel for chosen in compared for wheel in chosen.equations.wheels))
     acting = tuple(

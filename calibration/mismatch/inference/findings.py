@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import (
     Answer,
@@ -61,6 +62,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
+Array = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class Findings:
@@ -95,8 +98,9 @@ def findings_of(
     """Return what was found; `applicable` are those candidates that this recording allows, `drawn` is `drawn_for`."""
     problem = decision.equations.problem
     effects, changes = named_effects(decision, held_out, drawn)
-    of_wheels = own_values(decision, drawn)
-    parameters = (*calibrated_parameters(decision, drawn), *far_enough(decision, of_wheels))
+    covariance = parameter_covariance(decision, drawn)
+    of_wheels = own_values(decision, covariance)
+    parameters = (*calibrated_parameters(decision, covariance), *far_enough(decision, of_wheels))
     limits, places = decision.equations.thresholds, unexplained(decision)
     rest = bool(decision.unnamed)
     moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
@@ -194,12 +198,12 @@ def named_effects(
     return tuple(effects), tuple(changes)
 
 
-def calibrated_parameters(decision: Decision, drawn: Drawn | None) -> tuple[CalibratedParameter, ...]:
+def calibrated_parameters(decision: Decision, covariance: Array) -> tuple[CalibratedParameter, ...]:
     """Return where the recording moved each parameter of the simulation, beside all that was found."""
     equations, fit = decision.equations, decision.whole
     problem, nuisance = equations.problem, equations.nuisance
     values = calibrated_values(equations, fit)
-    variances = np.diag(parameter_covariance(decision, drawn))
+    variances = np.diag(covariance)
     places = {name: place for place, name in enumerate(nuisance.names)}
     found = []
     for name, prior in problem.simulation.parameters.items():

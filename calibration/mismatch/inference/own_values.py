@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import CalibratedParameter
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
-from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
 from regolithd.calibration.mismatch.inference.statements import after_number
 from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
@@ -21,16 +21,19 @@ from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.inference.intervals import Drawn
     from regolithd.calibration.mismatch.selection.decision import Decision
 
+Array = NDArray[np.float64]
 
-def own_values(decision: Decision, drawn: Drawn | None) -> tuple[CalibratedParameter, ...]:
-    """Return the wheels' own values that the readings contradict, beside the common value as their prior."""
+
+def own_values(decision: Decision, covariance: Array) -> tuple[CalibratedParameter, ...]:
+    """Return the wheels' own values that the readings contradict, beside the common value as their prior.
+
+    `covariance` is that of all coefficients of the decision's fit (`parameter_covariance`).
+    """
     equations, fit = decision.equations, decision.whole
     problem, nuisance = equations.problem, equations.nuisance
     values, found = calibrated_values(equations, fit), []
-    covariance = parameter_covariance(decision, drawn) if nuisance.own else np.zeros((0, 0))
     for name, (parameter, wheel) in nuisance.own.items():
         prior = problem.simulation.parameters[parameter]
         both = [nuisance.names.index(each) for each in (parameter, name)]

@@ -16,11 +16,12 @@ from regolithd.calibration.mismatch.inference.statements import (
 from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from regolithd.calibration.mismatch.answer import CalibratedParameter, Verdict
 
 AnyAnswer = TypeVar("AnyAnswer", bound=Answer)
+AnyParameter = TypeVar("AnyParameter", bound="CalibratedParameter")
 WORST_FIRST: tuple[Verdict, ...] = ("unexplained", "missing-physics", "consistent")
 
 
@@ -117,6 +118,20 @@ def priors_from_others(answer: Answer, others: Sequence[Answer]) -> dict[str, tu
             best = min(known, key=_std)
             found[parameter.name] = best.value, _std(best)
     return found
+
+
+def of_all_wheels(answer: Answer, priors: Collection[str]) -> Answer:
+    """Return an answer without the values of single wheels: another column need not have these."""
+    return replace(answer, parameters=tuple(each for each in answer.parameters if each.name in priors))
+
+
+def of_single_wheels(told: Iterable[AnyParameter], priors: Collection[str]) -> tuple[AnyParameter, ...]:
+    """Return the values of single wheels among what channels tell, one after the other: each as the first has it."""
+    found: dict[str, AnyParameter] = {}
+    for each in told:
+        if each.name not in priors:
+            found.setdefault(each.told_name, each)
+    return tuple(found.values())
 
 
 def nothing_else_is_wrong(before: Sequence[Answer], after: Sequence[Answer]) -> bool:

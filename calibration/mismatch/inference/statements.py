@@ -262,10 +262,15 @@ def after_number(unit: str) -> str:
 
 def what_it_follows(place: Unexplained, covariate: str) -> str:
     """Return what the residual does over a covariate (words): it follows that, or is a constant whatever that is."""
-    if place.curve is None or not place.curve.hardly_varies:
+    if place.curve is None or not is_constant(place):
         return f"follows {covariate}"
     constants = {"gain": "a constant share of the prediction", "drag": "a constant along the motion"}
     return f"is {constants.get(place.curve.coupling, 'a constant')} that hardly depends on {covariate}"
+
+
+def is_constant(place: Unexplained) -> bool:
+    """Return whether what is unexplained hardly varies over its covariate."""
+    return place.curve is not None and place.curve.hardly_varies
 
 
 def has_curve_of(place: Unexplained, before: Sequence[Unexplained]) -> bool:

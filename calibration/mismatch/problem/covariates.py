@@ -23,8 +23,8 @@ KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", *FOLLOW_SPEED, "time", "torque"}
 """Covariates that candidates need even where they are constant."""
 UNIT_WORD = re.compile(r"[munkM]?(A|V|N|Nm|W|J|m|s|g|Pa|Hz|bar|l|mol)[23]?|K|deg[CF]?|rad[2]?|min|h|rpm|per|percent|mL")
 """A part of a column's name that is of its unit: `A` of `current_A`, `m` and `s` of `flow_m_s`."""
-LITRES = re.compile(r".+?_(?=([mun]?(g|mol)_)?L(_(min|h|s|kg))?$)(?!L$)")
-"""What is before litres in a unit: `flow_` of `flow_L_min`, not `speed_` of `speed_L_rad_s`, which is on the left."""
+LITRES = re.compile(r"(.+?)_(L_(min|h|s|kg)|[mun]?(g|mol)_L(_(min|h|s|kg))?)")
+"""A name with litres in its unit: `flow_L_min`, and not `speed_L_rad_s`, which is on the left."""
 SLOW_SHARE = 0.05
 """Share of the highest usual speed below which an axis may stand (a choice): no more of it is noise of a speed sensor
 that is of use."""
@@ -175,8 +175,8 @@ def _stays_within(speed: Array, reach: float) -> NDArray[np.bool_]:
 
 def quantity(channel: str) -> str:
     """Return a channel's name without the unit at its end: `load` of `load_N` and of `load_kN`."""
-    if before := LITRES.match(channel):
-        return before.group().removesuffix("_")
+    if found := LITRES.fullmatch(channel):
+        return found[1]
     words = channel.split("_")
     while len(words) > 1 and UNIT_WORD.fullmatch(words[-1]):
         words.pop()

@@ -50,9 +50,10 @@ def shifted(recording: Recording, values: Array, by_s: float, on: Sequence[int] 
     return moved
 
 
-def beyond_the_end(recording: Recording, by_s: float) -> NDArray[np.bool_]:
-    """Return where `shifted` by so much holds the end of a run, shape (time, wheel)."""
+def beyond_the_end(recording: Recording, by_s: float, on: Sequence[int] = ()) -> NDArray[np.bool_]:
+    """Return where `shifted` by so much, on these wheels, holds the end of a run, shape (time, wheel)."""
     runs, of_run = np.unique(recording.run, return_inverse=True)  # a run's number may be a date
     ends = np.zeros(len(runs))
     np.maximum.at(ends, of_run, recording.time_s)
-    return np.repeat((recording.time_s + by_s > ends[of_run])[:, None], recording.shape[1], axis=1)
+    wheels = np.arange(recording.shape[1])
+    return (recording.time_s + by_s > ends[of_run])[:, None] & np.isin(wheels, on or wheels)

@@ -8,8 +8,6 @@ import numpy as np
 
 LEAST_TOLD = 0.0005
 """Relative change of an error below which it is told as none: percent have one decimal."""
-
-
 LEAST_VARIED = 0.1
 """Deviation of a curve's values as a share of their mean, below which it is a constant (a choice: a law that is a
 little wrong deviates by as much)."""

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import inf
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 RUNS_WITHIN = 0.5
 """Share of a parameter's value within which any simulation can be run, however well the value is said to be known (a
@@ -76,3 +80,9 @@ class SensorError:
 def own_name(parameter: str, wheel: int | str) -> str:
     """Return the name of a wheel's own deviation of a parameter among the values estimated from a recording."""
     return f"{parameter} of {wheel}"
+
+
+def parted_own_name(name: str, parameters: Iterable[str]) -> tuple[str, str] | None:
+    """Return which of these parameters, and which wheel, an own deviation is of; None: it is none of theirs."""
+    of = [each for each in parameters if name.startswith(own_name(each, ""))]
+    return (of[0], name.removeprefix(own_name(of[0], ""))) if of else None

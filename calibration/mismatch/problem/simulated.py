@@ -193,8 +193,7 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float], on: Mapping[str, tupl
         for name, blank in inputs.blanks.items()
     }
     for name, delay in late.items():
-        some = np.isin(np.arange(inputs.expected.shape[1]), on[name]) if on.get(name) else True
-        blanks[name] = blanks.get(name, False) | (beyond_the_end(inputs.expected, delay) & some)
+        blanks[name] = blanks.get(name, False) | beyond_the_end(inputs.expected, delay, on.get(name, ()))
     return replace(
         inputs,
         as_read=moved(inputs.as_read),

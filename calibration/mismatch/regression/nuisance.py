@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.problem.initial_states import initial_states
 from regolithd.calibration.mismatch.problem.prior import own_name
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
     from regolithd.calibration.mismatch.problem.initial_states import InitialState
     from regolithd.calibration.mismatch.problem.prior import Prior
@@ -143,7 +143,7 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     names, stds = [*names, *(state.name for state in states)], [*stds, *(state.std for state in states)]
     columns = [*columns, *as_shown(design.problem, [state.column for state in states])]
     own = _own_deviations(design.problem)
-    away = np.array([_from_prior(design.problem, name, own) for name in names])
+    away = np.array(from_priors(design.problem, names))
     design, places = design.extended(columns)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
@@ -153,13 +153,12 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     return design, Nuisance(tuple(names), places, precision, centre, stated, own, states)
 
 
-def _from_prior(problem: Problem, name: str, own: Mapping[str, tuple[str, int | str]]) -> float:
-    """Return how far the prior's mean is from where the problem is linearised, without any wheel's own deviation."""
+def from_priors(problem: Problem, names: Sequence[str]) -> list[float]:
+    """Return how far the means of priors are from where the problem is linearised, without any own deviation."""
     parameters = problem.simulation.parameters
-    if name in own:
-        parameter, wheel = own[name]
-        return parameters[parameter].own_of(wheel)
-    return parameters[name].value - problem.values[name] if name in parameters else 0.0
+    stated = {name: parameters[of].own_of(wheel) for name, (of, wheel) in _own_deviations(problem).items()}
+    stated |= {name: prior.value - problem.values[name] for name, prior in parameters.items() if name in names}
+    return [stated.get(name, 0.0) for name in names]
 
 
 def _own_deviations(problem: Problem) -> dict[str, tuple[str, int | str]]:

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     after_number,
     capital,
     had_to_leave_its_prior,
+    is_constant,
     listed,
     noun_before,
     noun_of,
@@ -179,7 +180,7 @@ def _left_out_sentence(answer: Answer, labels: Labels) -> str:
     names = list(dict.fromkeys(labels.effect(effect.name) for effect in answer.effects))
     if answer.verdict == "missing-physics":
         return f"The simulation leaves out {listed(names)}." if names else ""
-    varied = [place for place in answer.unexplained if not (place.curve and place.curve.hardly_varies)]
+    varied = (place for place in answer.unexplained if not is_constant(place))
     covariates = list(dict.fromkeys(labels.the(place.covariate) for place in varied))
     place = f" that depends on {listed(covariates)}" if covariates else ""
     if names:

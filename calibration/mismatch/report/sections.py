@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     capital,
     doubt_of,
     has_curve_of,
+    is_constant,
     listed,
     percent,
     plural,
@@ -256,8 +257,7 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
     covariate = labels.the(place.covariate) + labels.period(place)
-    constant = place.curve is not None and place.curve.hardly_varies
-    title = f"I{what_it_follows(place, covariate)[1:]}" if constant else f"Depends on {covariate}"
+    title = capital(what_it_follows(place, covariate)) if is_constant(place) else f"Depends on {covariate}"
     return UnexplainedSection(title, tuple(unbroken(fact) for fact in facts if fact), curve)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +50,7 @@ def _held_by_last(equations: NormalEquations, names: Fit, which: Sequence[int], 
     first, last = len(equations.nuisance.columns), len(with_curve.columns) - len(with_curve.terms[-1].group.columns)
     matrix = equations.normal_matrix(with_curve)
     inverse = pseudo_inverse(matrix[:first, :first], SINGULAR) if first else np.zeros((0, 0))
-    beside = matrix[first:, first:] - matrix[first:, :first] @ inverse @ matrix[:first, first:]
+    beside = schur_complement(matrix[first:, first:], matrix[:first, first:], inverse)
     size = np.zeros(last)
     for index in which:
         size[names.of_term(index)] = names.coefficients[names.of_term(index)]

@@ -136,15 +136,14 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
         tolerated = 0.0 if leaving.size else limits.form_misfit
     curves = best_of_each_smooth_term(equations, named.terms)
     left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
-    curve = best_curve(equations, named.terms, left)
-    if (
-        curve is not None
-        and not _is_a_finding(equations, named, curve, tolerated)
-        and _of_the_prediction(equations, curve)
-    ):
-        others = [(score, term) for score, term in left if not _of_the_prediction(equations, term)]
-        curve = best_curve(equations, named.terms, others)
-    return curve if curve is not None and _is_a_finding(equations, named, curve, tolerated) else None
+    others = [(score, term) for score, term in left if not _of_the_prediction(equations, term)]
+    for sought in (left, others):
+        curve = best_curve(equations, named.terms, sought)
+        if curve is None or _is_a_finding(equations, named, curve, tolerated):
+            return curve
+        if not _of_the_prediction(equations, curve):
+            return None
+    return None
 
 
 def _is_a_finding(equations: NormalEquations, named: Fit, curve: Term, tolerated: float) -> bool:

@@ -26,7 +26,7 @@ from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
 from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
-from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.problem.prior import parted_own_name
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
@@ -302,16 +302,15 @@ def _own_values(
 ) -> list[FleetParameter]:
     """Return the wheels' own values that are a finding, beside the common values of the parameters' owner."""
     equations, told = chosen.equations, []
-    first = place * len(equations.tangents)
-    for at in sorted(equations.released):
-        name = equations.tangents[at - first] if first <= at < first + len(equations.tangents) else ""
-        of = next((each for each in chosen.simulation.own_to_each_wheel if name.startswith(own_name(each, ""))), None)
-        if of is None or name in common:
+    for at, name in enumerate(equations.tangents, place * len(equations.tangents)):
+        of = parted_own_name(name, common) if at in equations.released else None
+        if of is None:
             continue
-        prior = chosen.simulation.parameters[of]
-        value, reach = common[of] + float(beside.fit.coefficients[at]), NINETY_PERCENT_STDS * float(beside.stds[at])
-        std = prior.of_one_wheel(THRESHOLDS.own_share).std
-        told.append(FleetParameter(name, prior.unit, common[of], std, value, value - reach, value + reach, rovers))
+        parameter, wheel = of
+        prior = chosen.simulation.parameters[parameter]
+        usual, std = common[parameter] + prior.own_of(wheel), prior.of_one_wheel(THRESHOLDS.own_share).std
+        value, reach = usual + float(beside.fit.coefficients[at]), NINETY_PERCENT_STDS * float(beside.stds[at])
+        told.append(FleetParameter(name, prior.unit, usual, std, value, value - reach, value + reach, rovers))
     return told
 
 

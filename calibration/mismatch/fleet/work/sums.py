@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
-from regolithd.calibration.mismatch.regression.nuisance import tangents
+from regolithd.calibration.mismatch.regression.nuisance import from_priors, tangents
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -189,8 +189,7 @@ def _posed(
 
 def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: Sequence[FoundTerm]) -> _Columns:
     names, stds, made = tangents(problem)
-    parameters = problem.simulation.parameters
-    shifts = [problem.values[name] - parameters[name].value if name in parameters else 0.0 for name in names]
+    shifts = -np.array(from_priors(problem, names))
     count, places = len(made), []
     for candidate, shape in laws:
         fresh = _of_law(problem, candidate, shape) if candidate.applies(problem) else ()
@@ -202,7 +201,7 @@ def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: S
         made, count = [*made, *term.columns.astype(np.float64)], count + len(term.columns)
     whole = problem.mask.shape
     values = np.where(problem.mask, np.stack([np.broadcast_to(each, whole) for each in made]), 0.0)
-    return _Columns(values, tuple(names), np.array(stds), np.array(shifts), tuple(places), tuple(own))
+    return _Columns(values, tuple(names), np.array(stds), shifts, tuple(places), tuple(own))
 
 
 def _of_law(problem: Problem, candidate: Candidate, shape: Shape) -> Array:

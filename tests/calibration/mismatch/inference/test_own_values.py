@@ -122,6 +122,9 @@ def test_a_season_of_recordings_tells_it_and_carries_it_over(stated: Path) -> No
     assert own.value == pytest.approx(0.9 * common.value, rel=0.03)
     found.write_corrected(corrected)
     assert compare(recorded(8, 0.9), load_simulation(corrected)).answer.verdict == "consistent"
+    again = compare([recorded(seed, 0.9) for seed in (2, 4, 6)], load_simulation(corrected)).answer
+    assert again.verdict == "consistent"
+    assert again.parameters[0].value == pytest.approx(common.value, abs=5)  # the stated deviation holds in a season
 
 
 def test_a_corrected_simulation_has_it_and_tells_when_it_is_gone(stated: Path) -> None:

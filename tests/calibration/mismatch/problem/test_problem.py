@@ -11,7 +11,7 @@ from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 
 from regolithd.calibration.mismatch import Prior, RecordingError, Simulation, compare, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.prior import SensorError, own_name
+from regolithd.calibration.mismatch.problem.prior import SensorError, own_name, parted_own_name
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -180,6 +180,8 @@ def test_a_simulation_without_sides_has_no_sets_and_no_contrasts() -> None:
     assert problem.wheel_sets == ()
     assert problem.contrasts("roll") == {}
     assert own_name("gain", 4) == "gain of 4"
+    assert parted_own_name("gain of 4", ["idle", "gain"]) == ("gain", "4")
+    assert parted_own_name("gain_factor of 4", ["idle", "gain"]) is None
 
 
 def test_a_stated_effect_is_added_unless_the_simulation_has_it() -> None:
