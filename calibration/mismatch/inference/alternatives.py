@@ -25,7 +25,6 @@ from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what
 from regolithd.calibration.mismatch.selection.region_search import schwarz_surcharge
 from regolithd.calibration.mismatch.selection.slow_noise import apart, score_beside_slow_noise
 from regolithd.calibration.mismatch.selection.smooth_terms import (
-    covariate_of,
     drop_what_a_curve_explains,
     power_share,
     weigh_against_smooth_terms,
@@ -173,7 +172,7 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     if _is_over_another_covariate(decision, fit):
         return False
     if in_place and not named.terms:
-        of_its_covariate = all(covariate_of(term) == curve.name for term in missing)
+        of_its_covariate = all(term.imitated_over == curve.name for term in missing)
         if of_its_covariate or len(missing) > 1:
             return of_its_covariate
     instead_of = decision.named if in_place else named
@@ -192,7 +191,7 @@ def _is_over_another_covariate(decision: Decision, fit: Fit) -> bool:
     if decision.unnamed or len(decision.named.terms) != 1 or len(fit.terms) != 1:
         return False
     (told,), (curve,) = decision.named.terms, fit.terms
-    if curve.group.named or curve.name in {"time", covariate_of(told)} or curve.wheels != told.wheels:
+    if curve.group.named or curve.name in {"time", told.imitated_over} or curve.wheels != told.wheels:
         return False
     return law_misfit(decision.equations, decision.named, fit) < decision.equations.thresholds.form_misfit
 

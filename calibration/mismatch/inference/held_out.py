@@ -181,13 +181,10 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     is unexplained; so is, without any name left, what is more probably there than not. `grid` are the groups before
     any data optimised their shapes.
     """
-    equations, threshold = decision.equations, decision.entry_threshold
     choice = groups_to_choose_from(decision, grid)
-    equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
+    decision, held_out = _errors_of_names(decision, choice)
     while (idle := held_out.without_gain()) is not None:
-        decision = without_name(replace(decision, equations=equations), idle)
-        equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
-    decision = replace(decision, equations=equations)
+        decision, held_out = _errors_of_names(without_name(decision, idle), choice)
     if decision.unnamed:
         decision, held_out = _errors_beside_curves(decision, choice)
     decision, held_out = _with_likelier_names(decision, held_out, choice)
@@ -221,6 +218,12 @@ def _with_likelier_names(
         else:
             decision = replace(decision, equations=other.equations, refused=decision.refused | {names_of(other)})
     return decision, held_out
+
+
+def _errors_of_names(decision: Decision, choice: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
+    """Return the errors of a decision's names without its curves, and it with the columns that the folds made."""
+    equations, errors = held_out_errors(decision.equations, decision.named, choice, decision.entry_threshold)
+    return replace(decision, equations=equations), errors
 
 
 def _errors_beside_curves(decision: Decision, choice: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:

@@ -12,7 +12,6 @@ from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURV
 from regolithd.calibration.mismatch.regression.smooth_groups import same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
-from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,7 +65,7 @@ def notes_on_a_curve_in_place(decision: Decision, others: Sequence[Alternative])
     if len(decision.named.terms) != 1 or not curves or curves[0].group.coupling in WITHOUT_CURVE:
         return ()
     (named,) = decision.named.terms
-    here, there = word_for(covariate_of(named), labels), word_for(curves[0].name, labels)
+    here, there = word_for(named.imitated_over, labels), word_for(curves[0].name, labels)
     note = f"{named.name} is about as probable as something without a name that follows the {there}"
     why = f"{here} and {there} go together in this recording"
     return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)

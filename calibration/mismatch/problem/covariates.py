@@ -43,6 +43,9 @@ STANDING_READINGS = 5
 through in fewer."""
 MOST_LEFT = 0.5
 """Share of the noise's variance up to which a speed is smooth (a choice: splines leave less, autoregressions more)."""
+MOST_EXACT = 0.5
+"""Share of the readings within the noise of a speed from which on, being exactly 0, they are the standstill (a choice:
+a sensor with noise reads exactly 0 by chance in few)."""
 ALTERNATING_SHARE = 0.15
 """Share of the highest usual speed below which what alternates is noise (a choice: with three standard deviations of a
 noise that reaches further, hardly a start or stop would be left)."""
@@ -125,10 +128,12 @@ def _reach(speed: Array, std: float | None) -> float:
 def _noise_at_standstill(speed: Array) -> float:
     """Return the reach of a speed's noise (time,) about zero, by its second differences while it stays slow.
 
-    These are free of a constant speed and of a ramp through zero. Where most of a standstill is exactly 0 (a dead
-    band, a speed that is set to 0 while a brake holds), where it is short, and where the noise reaches further than
-    what is slow, it is that of readings with the other sign than both neighbours: only noise goes +, −, +. The reading
-    in the middle tells it; at a stop of one reading the neighbours are ramps. At most the share of the usual speed.
+    These are free of a constant speed and of a ramp through zero. Where most of what is within that reach is exactly 0,
+    the axis reads 0 while it stands (a dead band, a speed that is set to 0 while a brake holds): the others are the
+    ends of motions, which bend, and have a sign. There, where a standstill is short, and where the noise reaches
+    further than what is slow, it is that of readings with a sign that neither neighbour has: only noise goes +, −, +,
+    or 0, +, 0. The reading in the middle tells it; at a stop of one reading the neighbours are ramps. At most the share
+    of the usual speed.
     """
     known = speed[np.isfinite(speed)]
     usual = float(np.quantile(np.abs(known), USUAL_SPEED_QUANTILE)) if known.size else 0.0
@@ -138,6 +143,9 @@ def _noise_at_standstill(speed: Array) -> float:
         second = np.abs(np.diff(speed, 2))[level[1:-1]]
         deviation = float(np.quantile(second, ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
         reach = min(STANDSTILL_DEVIATIONS * deviation, SLOW_SHARE * usual)
+        within = known[np.abs(known) <= reach]
+        if np.sum(within == 0) > MOST_EXACT * within.size:
+            reach = 0.0
     alternating = np.abs(speed[_alternates(speed) & _stays_below(speed, ALTERNATING_SHARE * usual, 3)])
     if alternating.size >= FEWEST_ALTERNATIONS:
         deviation = float(np.quantile(alternating, ONE_STD_QUANTILE))
@@ -146,9 +154,9 @@ def _noise_at_standstill(speed: Array) -> float:
 
 
 def _alternates(speed: Array) -> NDArray[np.bool_]:
-    """Return which readings (time,) have the other sign than the one before and the one after."""
-    turned = np.concatenate(([False], speed[:-1] * speed[1:] < 0, [False]))
-    return turned[:-1] & turned[1:]
+    """Return which readings (time,) have a sign that neither the one before nor the one after has: that, or none."""
+    turned = np.concatenate(([False], speed[:-1] * speed[1:] <= 0, [False]))
+    return turned[:-1] & turned[1:] & (speed != 0)
 
 
 def _stays_below(speed: Array, limit: float, count: int) -> NDArray[np.bool_]:

@@ -28,6 +28,7 @@ from regolithd.calibration.mismatch.problem.input_doubt import (
     wheels_in_common,
 )
 from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
+from regolithd.calibration.mismatch.problem.input_units import notes_on_units
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.shown_errors import notes_on_errors, shown_errors
 from regolithd.calibration.mismatch.signal.robust import robust_std
@@ -152,6 +153,8 @@ def inputs_of(
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
     expected = expected.with_notes(*notes_on_errors(shown, simulation.sensors, as_read, simulation.channel))
+    in_units = notes_on_units(recording, simulation, lambda other: predict(_prepared(other, simulation)[0]), predicted)
+    expected = expected.with_notes(*in_units)
     carries = _carries_over_gaps(as_read, simulation, values, predicted)
     in_gaps = inputs_otherwise_in_gaps(expected, simulation.inputs) if carries else None
     return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within, in_gaps)

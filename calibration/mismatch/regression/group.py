@@ -94,6 +94,11 @@ class Term:
         """The candidate's or the covariate's."""
         return self.group.name
 
+    @property
+    def imitated_over(self) -> str:
+        """The covariate over which a curve can imitate it; of a smooth term its own."""
+        return self.group.candidate.imitated_over if self.group.candidate else self.name
+
     def settled_in(self, problem: Problem) -> bool:
         """Return whether it is the delay of an input that a problem has on time: what was found before it was posed."""
         return not self.group.is_change and self.group.shape.get("late") in problem.on_time

@@ -13,7 +13,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.causality import acts_forwards
-from regolithd.calibration.mismatch.selection.law_misfit import explained
+from regolithd.calibration.mismatch.selection.law_misfit import explained, explained_beside
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 
@@ -121,7 +121,8 @@ def _gains_by_its_covariate(equations: NormalEquations, fit: Fit, index: int) ->
 def _is_a_parameter(equations: NormalEquations, fit: Fit, index: int) -> bool:
     """Return whether a parameter of the simulation acts as a term does, and explains as much within its prior.
 
-    What the term gains is then the way that the parameter need not go, and no evidence of the readings.
+    What the term gains is then the way that the parameter need not go, and no evidence of the readings. Where another
+    parameter has to leave its own prior without the term, it is evidence.
     """
     problem, nuisance = equations.problem, equations.nuisance
     names = problem.simulation.parameter_effects
@@ -134,7 +135,10 @@ def _is_a_parameter(equations: NormalEquations, fit: Fit, index: int) -> bool:
         freed = equations.with_nuisance(nuisance.widened([place], problem))
         return freed.fit(fit.terms).delta_chi2 - freed.fit(rest).delta_chi2
 
-    within = places.difference(nuisance.contradicting_their_priors(equations.fit(rest), problem).tolist())
+    strained = set(nuisance.contradicting_their_priors(equations.fit(rest), problem).tolist())
+    within = places - strained
+    if within and strained - set(nuisance.contradicting_their_priors(fit, problem).tolist()):
+        return False
     return any(gain_beside_any(place) < equations.thresholds.lead_margin for place in within)
 
 
@@ -286,7 +290,8 @@ def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_th
     """
     limits = equations.thresholds
     remaining = float(chi2_of(equations, less).sum())
-    worthwhile = min(limits.further_share * explained(equations, less), limits.remaining_share * remaining)
+    misfit = limits.further_share * _explained_beside(equations, less, more)
+    worthwhile = min(misfit, limits.remaining_share * remaining)
     faulty = wheels_of_faulty_sensors(more)
     if any(term.group.own_channel is None and set(term.wheels) <= faulty for term in more.terms):
         worthwhile = limits.beside_smooth_share * less.delta_chi2
@@ -298,6 +303,18 @@ def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_th
         return True
     bent = gained > entry and any(_is_bent(equations, term.group) for term in less.terms)
     return bent and equations.score(_in_usual_form(equations, more)) - told > entry
+
+
+def _explained_beside(equations: NormalEquations, less: Fit, more: Fit) -> float:
+    """Return the Δχ² of a smaller set of which the further effects of a larger one can hold a share as its misfit.
+
+    All of it, where the larger one has not the effects of the smaller one.
+    """
+    known = {term.group.subject for term in less.terms}
+    further = [term for term in more.terms if term.group.subject not in known]
+    if len(further) != len(more.terms) - len(less.terms):
+        return explained(equations, less)
+    return explained_beside(equations, less, equations.fit((*less.terms, *further)))
 
 
 def _is_bent(equations: NormalEquations, group: Group) -> bool:

@@ -31,7 +31,7 @@ from regolithd.calibration.mismatch.selection.region_search import (
     with_region,
 )
 from regolithd.calibration.mismatch.selection.slow_noise import lead_beside_slow_noise
-from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, unexplained_beside
+from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -101,7 +101,7 @@ def _better_in_a_range(decision: Decision) -> tuple[int, Confined] | None:
         for confined in _in_ranges(equations, rest, term, _covariates(decision, term)):
             ahead = confined.score - told
             instead = law_misfit(equations, named, confined.fit)
-            of_its_covariate = confined.region.covariate == covariate_of(term)
+            of_its_covariate = confined.region.covariate == term.imitated_over
             better = ahead > limits.smooth_term_entry and (not of_its_covariate or instead > limits.form_misfit)
             better = better and (best is None or confined.score > best[1].score)
             if better and _lead_in_slow_noise(decision, confined) > limits.slow_noise_entry:
@@ -129,7 +129,7 @@ def _lead_in_slow_noise(decision: Decision, confined: Confined) -> float:
 def _may_be_confined(term: Term) -> bool:
     """Return whether a term is a law of the machine: no sensor's fault, no change at a time, no corrected effect."""
     group = term.group
-    return not group.is_change and group.own_channel is None and covariate_of(term) not in {"time", "none"}
+    return not group.is_change and group.own_channel is None and term.imitated_over not in {"time", "none"}
 
 
 def _covariates(decision: Decision, term: Term) -> list[tuple[str, str]]:
@@ -140,13 +140,13 @@ def _covariates(decision: Decision, term: Term) -> list[tuple[str, str]]:
     equations, least = decision.equations, decision.equations.thresholds.smooth_term_entry
     scored = best_of_each_smooth_term(equations, decision.named.terms)
     left = (*decision.unnamed, *(curve for score, curve in scored if score > least))
-    own = (curve for _, curve in scored if curve.name == covariate_of(term))
+    own = (curve for _, curve in scored if curve.name == term.imitated_over)
     found: dict[str, str] = {}
     for curve in (*left, *own):
         if curve.group.coupling not in WITHOUT_CURVE and set(curve.wheels) & set(term.wheels):
             found.setdefault(curve.name, curve.group.coupling)
     kept = list(found.items())
-    return [*kept[:COVARIATES_TRIED], *(each for each in kept[COVARIATES_TRIED:] if each[0] == covariate_of(term))]
+    return [*kept[:COVARIATES_TRIED], *(each for each in kept[COVARIATES_TRIED:] if each[0] == term.imitated_over)]
 
 
 def _in_ranges(
@@ -167,7 +167,7 @@ def _in_ranges(
         values, _ = acting(equations.problem, covariate, coupling)
         edges = edges_of(known_values(equations, covariate, coupling, named.wheels))
         for law, column in zip(laws, columns, strict=True):
-            if not len(edges) or covariate == covariate_of(law):
+            if not len(edges) or covariate == law.imitated_over:
                 continue
             sums = sums_over_ranges(equations, read, (covariate, coupling), (values, column), law.wheels, edges)
             ranges = allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), rest)

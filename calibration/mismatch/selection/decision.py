@@ -224,9 +224,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     if freed is not None:
         (equations, named), unnamed = freed, ()
         whole = named
-    left = residual_of(equations, whole)
-    noise = problem.noise_of(left)
-    equations = equations.weighted(noise_of_whitened(equations.design, left).weights)
+    equations, noise = _beside_all_found(equations, whole)
     return Decision(
         equations=equations,
         noise=noise,
@@ -236,6 +234,13 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
         whole=equations.fit((*named.terms, *unnamed)),
         other_statements=other_statements,
     )
+
+
+def _beside_all_found(equations: NormalEquations, whole: Fit) -> tuple[NormalEquations, NoiseModel]:
+    """Return the equations weighted by the noise that all that was found leaves, and that noise."""
+    left = residual_of(equations, whole)
+    weights = noise_of_whitened(equations.design, left).weights
+    return equations.weighted(weights), equations.problem.noise_of(left)
 
 
 def as_if_late(decision: Decision) -> Decision | None:
@@ -268,14 +273,19 @@ def answer_names(terms: Sequence[Term]) -> frozenset[str]:
 def without_name(decision: Decision, index: int) -> Decision:
     """Return the decision without one of its named effects, which held-out readings refused.
 
-    What it leaves is held against the smooth terms again.
+    What it leaves is held against the smooth terms again, by the noise beside all that is significant: that beside the
+    name has in it what the name did not explain.
     """
-    equations, threshold = decision.equations, decision.entry_threshold
-    refused = decision.refused | {names_of(decision)}
+    threshold, refused = decision.entry_threshold, decision.refused | {names_of(decision)}
+    equations = decision.equations
+    equations = equations.weighted(noise_of_whitened(equations.design, noise_left(equations)).weights)
     kept = equations.fit(decision.named.without(index))
     named, unnamed = weigh_against_smooth_terms(equations, kept, (), threshold)
-    whole = equations.fit((*named.terms, *unnamed))
-    return replace(decision, named=named, unnamed=unnamed, whole=whole, refused=refused)
+    equations, noise = _beside_all_found(equations, equations.fit((*named.terms, *unnamed)))
+    named, whole = equations.fit(named.terms), equations.fit((*named.terms, *unnamed))
+    return replace(
+        decision, equations=equations, noise=noise, named=named, unnamed=unnamed, whole=whole, refused=refused
+    )
 
 
 def _largest_that_passes(equations: NormalEquations, subsets: Sequence[Fit], threshold: float) -> Fit:

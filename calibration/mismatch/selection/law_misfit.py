@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.problem.covariates import quantity
+from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
@@ -19,6 +21,7 @@ from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schu
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -32,23 +35,41 @@ def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float
 def misfit_beside(equations: NormalEquations, names: Fit, with_curve: Fit) -> float:
     """Return the share of Δχ² that a curve adds to names, those of delays as far as the curve can hold what they leave.
 
+    The curve is the last term.
+    """
+    gain = with_curve.delta_chi2 - names.delta_chi2
+    return gain / max(explained_beside(equations, names, with_curve) + gain, 1e-9)
+
+
+def explained_beside(equations: NormalEquations, names: Fit, more: Fit) -> float:
+    """Return the Δχ² of names of which the further terms of a fit, its last ones, can hold a share as their misfit.
+
     What an inexact law leaves is a share of the law, reading by reading. A delay acts where the prediction changes, and
-    explains more than any load there: a curve that it hardly follows (a shadow over the sun's azimuth) holds little of
-    what its law misses, however much it explains. The curve is the last term.
+    explains more than any load there: a term that it hardly follows (a shadow over the sun's azimuth) holds little of
+    what its law misses, however much it explains. What follows the prediction, or is a further delay, holds it all.
     """
     delays = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
-    if not delays or any(term.group.is_change for term in names.terms):
-        return law_misfit(equations, names, with_curve)
+    further = more.terms[len(names.terms) :]
+    changed = any(term.group.is_change for term in names.terms)
+    follows = any(term.name == SensorDelay.name or is_of_the_prediction(equations.problem, term) for term in further)
+    if not delays or changed or follows:
+        return explained(equations, names)
     others = equations.fit([term for term in names.terms if term.name != SensorDelay.name])
-    gain, by_delays = with_curve.delta_chi2 - names.delta_chi2, names.delta_chi2 - others.delta_chi2
-    held = min(_held_by_last(equations, names, delays, with_curve), by_delays)
-    return gain / max(explained(equations, names) - by_delays + held + gain, 1e-9)
+    by_delays = names.delta_chi2 - others.delta_chi2
+    columns = sum(len(term.group.columns) for term in further)
+    held = min(_held_by_last(equations, names, delays, more, columns), by_delays)
+    return explained(equations, names) - by_delays + held
 
 
-def _held_by_last(equations: NormalEquations, names: Fit, which: Sequence[int], with_curve: Fit) -> float:
-    """Return the Δχ² that the last term of a fit has in common with some names, beside the free parameters."""
-    first, last = len(equations.nuisance.columns), len(with_curve.columns) - len(with_curve.terms[-1].group.columns)
-    matrix = equations.normal_matrix(with_curve)
+def is_of_the_prediction(problem: Problem, term: Term) -> bool:
+    """Return whether a term is over the size of the prediction, or over its past."""
+    return term.imitated_over in {"torque", quantity(problem.simulation.channel)} | LAGGED
+
+
+def _held_by_last(equations: NormalEquations, names: Fit, which: Sequence[int], more: Fit, columns: int) -> float:
+    """Return the Δχ² that the last columns of a fit have in common with some names, beside the free parameters."""
+    first, last = len(equations.nuisance.columns), len(more.columns) - columns
+    matrix = equations.normal_matrix(more)
     inverse = pseudo_inverse(matrix[:first, :first], SINGULAR) if first else np.zeros((0, 0))
     beside = schur_complement(matrix[first:, first:], matrix[:first, first:], inverse)
     size = np.zeros(last)

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.problem.covariates import quantity
-from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import (
@@ -21,7 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     wheels_of_faulty_sensors,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
-from regolithd.calibration.mismatch.selection.law_misfit import law_misfit, misfit_beside
+from regolithd.calibration.mismatch.selection.law_misfit import is_of_the_prediction, law_misfit, misfit_beside
 from regolithd.calibration.mismatch.selection.slow_noise import (
     best_curve,
     lead_beside_slow_noise,
@@ -84,7 +82,7 @@ def _is_behind_a_curve(equations: NormalEquations, named: Fit, curve: Term) -> b
 
     The curve has not to be likelier by chance, as it would be by a name's entry, but significant beyond the effects.
     """
-    if len(named.terms) < 2 or all(covariate_of(term) == curve.name for term in named.terms):
+    if len(named.terms) < 2 or all(term.imitated_over == curve.name for term in named.terms):
         return False
     return _is_ahead(equations, equations.fit((curve,)), named, equations.thresholds.smooth_term_entry)
 
@@ -97,7 +95,7 @@ def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_thr
     """
     limits = equations.thresholds
     if all(term.group.named for term in named.terms):
-        of_its_covariate = all(covariate_of(term) == curve.terms[-1].name for term in named.terms)
+        of_its_covariate = all(term.imitated_over == curve.terms[-1].name for term in named.terms)
         misfit = law_misfit(equations, named, curve)
         another_law = not of_its_covariate and misfit > limits.form_misfit
         return another_law and _is_ahead(equations, curve, named, limits.smooth_term_entry)
@@ -136,12 +134,12 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
         tolerated = 0.0 if leaving.size else limits.form_misfit
     curves = best_of_each_smooth_term(equations, named.terms)
     left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
-    others = [(score, term) for score, term in left if not _of_the_prediction(equations, term)]
+    others = [(score, term) for score, term in left if not is_of_the_prediction(equations.problem, term)]
     for sought in (left, others):
         curve = best_curve(equations, named.terms, sought)
         if curve is None or _is_a_finding(equations, named, curve, tolerated):
             return curve
-        if not _of_the_prediction(equations, curve):
+        if not is_of_the_prediction(equations.problem, curve):
             return None
     return None
 
@@ -151,14 +149,7 @@ def _is_a_finding(equations: NormalEquations, named: Fit, curve: Term, tolerated
     beside = equations.fit((*named.terms, curve))
     if power_share(equations, beside, named) < equations.thresholds.smooth_term_power:
         return False
-    misfit = law_misfit if _of_the_prediction(equations, curve) else misfit_beside
-    return not named.terms or misfit(equations, named, beside) >= tolerated
-
-
-def _of_the_prediction(equations: NormalEquations, curve: Term) -> bool:
-    """Return whether a curve is over the size of the prediction, or over its past."""
-    of_size = {"torque", quantity(equations.problem.simulation.channel)}
-    return curve.name in of_size | LAGGED
+    return not named.terms or misfit_beside(equations, named, beside) >= tolerated
 
 
 def power_share(equations: NormalEquations, beside: Fit, named: Fit) -> float:
@@ -166,11 +157,6 @@ def power_share(equations: NormalEquations, beside: Fit, named: Fit) -> float:
     on = list(beside.terms[-1].wheels)
     power = np.sum(contribution(equations, beside, len(beside.terms) - 1)[:, on] ** 2)
     return float(power / max(float(np.sum(residual_of(equations, named)[:, on] ** 2)), 1e-300))
-
-
-def covariate_of(term: Term) -> str:
-    """Return the covariate over which a curve can imitate a term."""
-    return term.group.candidate.imitated_over if term.group.candidate else term.name
 
 
 def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Term) -> Fit:
@@ -198,7 +184,7 @@ def drop_what_gains_little(equations: NormalEquations, named: Fit, curve: Term) 
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
     """Return whether a term's covariate is a curve's on the same wheels."""
     wheels = sorted(set(term.wheels) & set(curve.wheels))
-    if not wheels or covariate_of(term) == "none":
+    if not wheels or term.imitated_over == "none":
         return False
     covariate = term.group.candidate.covariate if term.group.candidate else term.name
     return same_covariate(problem, covariate, curve.name, wheels)
@@ -229,7 +215,7 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
 
 def _is_lasting_change(term: Term) -> bool:
     """Return whether a term begins some time and lasts; a sensor's fault, which its own channel shows, may go."""
-    return covariate_of(term) == "time" and term.group.own_channel is None
+    return term.imitated_over == "time" and term.group.own_channel is None
 
 
 def _is_significant(equations: NormalEquations, given: Fit, curve: Term, gain: float) -> bool:

@@ -53,6 +53,25 @@ def test_noise_shows_beside_a_standstill_that_is_set_to_zero() -> None:
     np.testing.assert_array_equal(found[true != 0], np.sign(true[true != 0]))
 
 
+def test_where_an_axis_reads_zero_while_it_stands_the_ends_of_its_motions_have_a_sign() -> None:
+    """They bend, which is no noise: a dead time at a stop would be evidence against friction."""
+    phase = np.arange(COUNT) / 150
+    turning = np.where(phase % 2 < 1, 2 * np.sin(np.pi * (phase % 1)) ** 4, 0.0) * np.where(phase % 4 < 2, 1, -1)
+    speed = np.where(np.abs(turning) < 1e-12, 0.0, turning)[:, None]
+    np.testing.assert_array_equal(direction_of(speed), np.sign(speed))
+
+
+def test_single_counts_between_zeros_are_no_direction() -> None:
+    """An encoder at rest on the edge of a count reads it once in a while."""
+    read = moves()
+    at_rest = np.flatnonzero(read[:, 0] == 0)
+    counts = at_rest[(at_rest % 7 == 3) & (at_rest % 150 > 5)]
+    read[counts, 0] = np.where(counts % 2, 0.05, -0.05)
+    found = direction_of(read)
+    assert (found[counts] == 0).all()
+    np.testing.assert_array_equal(found[np.abs(read) > 1], np.sign(read[np.abs(read) > 1]))
+
+
 def test_a_speed_without_noise_has_its_sign() -> None:
     """Also where it passes zero slowly; what is not known has none."""
     speed = np.sin(np.arange(COUNT) / 300)[:, None]

@@ -1,0 +1,90 @@
+"""Inputs that are likely in another unit than their names say: converted, the simulation leaves far less."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
+
+Array = NDArray[np.float64]
+
+CONVERSIONS: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "degC": ((1.0, -273.15, "K"), (5 / 9, -160 / 9, "°F")),
+    "K": ((1.0, 273.15, "°C"),),
+    "rad": ((np.pi / 180, 0.0, "deg"),),
+    "deg": ((180 / np.pi, 0.0, "rad"),),
+    "rad_s": ((np.pi / 180, 0.0, "deg/s"), (np.pi / 30, 0.0, "rpm")),
+    "deg_s": ((180 / np.pi, 0.0, "rad/s"), (6.0, 0.0, "rpm")),
+    "rpm": ((30 / np.pi, 0.0, "rad/s"), (60.0, 0.0, "revolutions per second")),
+    "m_s": ((1 / 3.6, 0.0, "km/h"),),
+    "Pa": ((100.0, 0.0, "mbar"), (1e5, 0.0, "bar")),
+    "bar": ((1e-3, 0.0, "mbar"), (1e-5, 0.0, "Pa")),
+    "percent": ((100.0, 0.0, "shares of 1"),),
+    "pct": ((100.0, 0.0, "shares of 1"),),
+}
+"""Units at the end of a column's name, and what is mistaken for them: a reading in that is multiplied, then shifted."""
+MISTAKABLE = re.compile(rf".+?_({'|'.join(CONVERSIONS)})(_\d+)?")
+"""The end of such a name; a number may follow the unit."""
+LEFT_AS_READ = 0.05
+"""Power that the simulation leaves, over the variance of what was recorded, from which units are tried (a choice: an
+input in another unit leaves a large part of it, and a recording that fits costs no further run)."""
+LEFT_CONVERTED = 0.1
+"""Share of that power up to which a conversion is likely (a choice: left-out physics is no change of a unit)."""
+LEAST_KNOWN = 0.2
+"""Share of the readings that have to be predicted for that (a choice)."""
+
+
+def notes_on_units(
+    recording: Recording,
+    simulation: Predictor,
+    predict: Callable[[Recording], Array],
+    predicted: Callable[[], Array],
+) -> Iterator[str]:
+    """Yield a note for each input that is likely in another unit.
+
+    `predict` runs the simulation as it is stated; `predicted` returns what it predicts from the readings as they are.
+
+    Raises
+    ------
+    RecordingError
+        Where the simulation, from the readings as they are, is worse than the mean of what it predicts.
+    """
+    measured, columns = recording.channel(simulation.channel), simulation.inputs
+    mistakable = [(name, found[1]) for name in columns if (found := MISTAKABLE.fullmatch(name))]
+    recorded = [(name, unit) for name, unit in mistakable if name in recording.channels]
+    if not recorded:
+        return
+    as_read, variance = _power(measured - predicted()), float(np.nanvar(measured))
+    for name, stated in recorded if as_read > LEFT_AS_READ * variance else ():
+        for factor, offset, unit in CONVERSIONS[stated]:
+            converted = recording.with_channels(**{name: factor * recording.channel(name) + offset})
+            try:
+                left = _power(measured - predict(converted))
+            except (RecordingError, SimulationError):
+                continue
+            if left < LEFT_CONVERTED * as_read:
+                told = (
+                    f"{name} is likely in {unit}: converted from that, the simulation leaves {left / as_read:.1g} of "
+                    f"the mean square that it leaves of {simulation.channel} now. Convert the column to {stated}, or "
+                    f"correct the simulation if it takes it so"
+                )
+                if as_read > variance:
+                    raise RecordingError(told)
+                yield f"{told}."
+                break
+
+
+def _power(left: Array) -> float:
+    """Return the mean square of what is known of a difference (time, wheel); infinite where hardly anything is."""
+    known = np.isfinite(left)
+    return float(np.mean(left[known] ** 2)) if np.mean(known) > LEAST_KNOWN else float("inf")

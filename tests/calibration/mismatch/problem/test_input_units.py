@@ -1,0 +1,69 @@
+"""An input in another unit than its name says is told, where a conversion explains nearly all that is left."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, RecordingError, Simulation, from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+ROWS = 2000
+RNG = np.random.default_rng(3)
+RAMP_RAD, ROOM_DEGC = np.cumsum(RNG.normal(0, 0.01, ROWS)) % 0.3, 20 + 5 * np.sin(np.arange(ROWS) / 200)
+
+
+class Climbing(Simulation):
+    """A current that carries a weight up a ramp, through air whose density falls with its temperature."""
+
+    channel, unit = "motor_A", "A"
+    inputs = ("ramp_rad", "room_degC")
+    parameters: ClassVar = {"gain_A": Prior(8.0, 0.1, "A"), "air_A": Prior(300.0, 10.0, "A K")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the weight's part and the air's."""
+        return values["gain_A"] * np.sin(inputs["ramp_rad"]) + values["air_A"] / (inputs["room_degC"] + 273.15)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return both inputs."""
+        return {"pitch": inputs["ramp_rad"], "temperature": inputs["room_degC"]}
+
+
+def columns(left_out: float = 0.0) -> dict[str, Array]:
+    """Return a recording with white noise, and without a part of the current that follows the ramp."""
+    current = (8 + left_out) * np.sin(RAMP_RAD) + 300 / (ROOM_DEGC + 273.15) + RNG.normal(0, 0.05, ROWS)
+    return {"t_s": np.arange(ROWS) * 0.1, "motor_A": current, "ramp_rad": RAMP_RAD, "room_degC": ROOM_DEGC}
+
+
+def notes_of(table: dict[str, Array]) -> list[str]:
+    """Return the notes on units."""
+    notes = build_problem(from_columns(table), Climbing()).recording.notes
+    return [note for note in notes if "is likely in" in note]
+
+
+def test_a_temperature_in_kelvin_has_a_note_with_the_cure() -> None:
+    """The recording is compared all the same."""
+    (note,) = notes_of({**columns(), "room_degC": ROOM_DEGC + 273.15})
+    assert note.startswith("room_degC is likely in K: ")
+    assert "Convert the column to degC" in note
+
+
+def test_a_simulation_that_predicts_nothing_by_a_unit_is_an_error() -> None:
+    """Names of what is left would be names of the mistake."""
+    with pytest.raises(RecordingError, match=r"ramp_rad is likely in deg: .* Convert the column to rad"):
+        build_problem(from_columns({**columns(), "ramp_rad": np.rad2deg(RAMP_RAD)}), Climbing())
+
+
+@pytest.mark.parametrize("left_out", [0.0, 2.0, 8.0])
+def test_what_is_left_out_is_no_other_unit(left_out: float) -> None:
+    """However large it is."""
+    assert notes_of(columns(left_out)) == []
