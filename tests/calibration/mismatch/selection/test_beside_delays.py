@@ -1,4 +1,4 @@
-"""What a delay hides: a curve that its law does not follow."""
+"""What a delay hides: a curve, or an effect, that its law does not follow."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch import Candidate, Coefficient, Prior, Simulation, compare
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.answer import Answer
 
 Array = NDArray[np.float64]
@@ -107,3 +108,55 @@ def test_what_is_late_on_one_string_leaves_the_others_on_time(late_input: bool, 
     assert effect.shape["late"] == ("sun" if late_input else "power_W")
     assert effect.parameters["delay_s"].value == pytest.approx(180, abs=15)
     assert [place.wheels for place in answer.unexplained] == ([("west",)] if lost else [])
+
+
+class Crosstalk(Candidate):
+    """A part of the lift that the balance shows as drag."""
+
+    name, covariate = "balance-crosstalk", "lift"
+    equation, words = "ΔD = c L", "a part of the lift in the drag channel"
+    signature, experiment = "a residual in proportion to the lift", "hang weights on the lift axis"
+    source, needs = "calibration of balances", "a lift"
+    requires = ("lift",)
+    along_motion = False
+    coefficients: ClassVar = (Coefficient("share", "1", 0),)
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
+        """Return the lift."""
+        return problem.covariates["lift"][None]
+
+
+class Balance(Simulation):
+    """Drag of a wing, in proportion to the dynamic pressure."""
+
+    channel, unit = "drag_N", "N"
+    inputs = ("pressure_Pa",)
+    parameters: ClassVar = {"area_m2": Prior(0.02, 0.001, "m²")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the drag."""
+        return values["area_m2"] * inputs["pressure_Pa"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the lift."""
+        return {"lift": inputs["lift_N"]}
+
+    def candidates(self, library: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+        """Return the crosstalk as well."""
+        return (*library, Crosstalk())
+
+
+@pytest.mark.parametrize("share", [0.0, 0.011])
+def test_a_small_effect_beside_a_delay_has_its_name(share: float) -> None:
+    """It gains less than a hundredth of what the delay explains, and is not of the prediction's changes."""
+    rng, rows = np.random.default_rng(5), 1500
+    pressure = 500 + 400 * np.sign(np.sin(np.arange(rows) / 4)) * rng.uniform(0.3, 1.0, rows)
+    lift = 40 * np.sin(np.arange(rows) / 90)
+    drag = 0.0203 * np.concatenate((pressure[:2], pressure[:-2])) + share * lift + rng.normal(0, 1.5, rows)
+    columns = {"t_s": 0.2 * np.arange(rows), "drag_N": drag, "pressure_Pa": pressure, "lift_N": lift}
+    answer = compare(columns, Balance()).answer
+    assert sorted(effect.name for effect in answer.effects) == [
+        *(["balance-crosstalk"] if share else []),
+        "sensor-delay",
+    ]
+    assert answer.unexplained == ()

@@ -239,3 +239,46 @@ def test_a_wrong_parameter_has_no_effects_name_whose_law_it_has(seed: int) -> No
     assert friction.beyond_prior()
     assert friction.low < 1.25 < friction.high
     assert [effect.name for effect in rubbing(2.5, seed).effects] == ["coulomb-friction"]
+
+
+class Cart(Simulation):
+    """A motor's current: rolling resistance of a mass, and the motor's own friction."""
+
+    channel, unit = "motor_A", "A"
+    inputs = ("wheel_rad_s", "mass_kg")
+    parameters: ClassVar = {"rolling_A_kg": Prior(0.02, 0.001, "A/kg"), "idle_A": Prior(1.2, 0.06, "A")}
+    parameter_effects: ClassVar = {"idle_A": "coulomb-friction"}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return both against the motion."""
+        size = values["rolling_A_kg"] * inputs["mass_kg"] + values["idle_A"]
+        return np.asarray(size * np.sign(inputs["wheel_rad_s"]))
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return the speed and the mass."""
+        return {"wheel_speed": inputs["wheel_rad_s"], "mass": inputs["mass_kg"]}
+
+
+def cart(mass_kg: NDArray[np.float64]) -> Answer:
+    """Return the answer to a cart with a Coulomb friction of 1 A that the simulation does not have."""
+    rng, rows = np.random.default_rng(8), len(mass_kg)
+    speed = 3 * np.sign(np.sin(np.arange(rows) / 25)) * (1 + 0.5 * np.sin(np.arange(rows) / 180))
+    current = (0.02 * mass_kg + 2.2) * np.sign(speed) + rng.normal(0, 1.0, rows)
+    return compare(
+        {"t_s": 0.1 * np.arange(rows), "motor_A": current, "wheel_rad_s": speed, "mass_kg": mass_kg}, Cart()
+    ).answer
+
+
+def test_an_effect_is_no_parameter_of_its_law_where_another_parameter_leaves_its_prior_without_it() -> None:
+    """Of one mass, more rolling resistance acts as the friction does: both are told, neither as sure."""
+    answer = cart(np.full(ROWS, 185.0))
+    told = {tuple(effect.name for effect in answer.effects), *(other.effects for other in answer.alternatives)}
+    assert told == {(), ("coulomb-friction",)}
+    assert answer.probability is not None
+    assert answer.probability < 0.7
+
+
+def test_a_mass_that_varies_tells_the_effect_from_the_parameter() -> None:
+    """It is the friction alone."""
+    answer = cart(np.repeat([100.0, 300.0, 200.0], ROWS // 3))
+    assert [effect.name for effect in answer.effects] == ["coulomb-friction"]
