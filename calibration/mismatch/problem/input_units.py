@@ -40,6 +40,11 @@ LEFT_AS_READ = 0.05
 input in another unit leaves a large part of it, and a recording that fits costs no further run)."""
 LEFT_CONVERTED = 0.1
 """Share of that power up to which a conversion is likely (a choice: left-out physics is no change of a unit)."""
+LEFT_SHRUNK = 0.5
+"""Share of what the simulation leaves with the input at 0, up to which a smaller unit is likely (a choice): what the
+input should not do at all, a smaller unit takes away as well."""
+BEYOND_ALL = 1e100
+"""What no prediction reaches, in any unit."""
 LEAST_KNOWN = 0.2
 """Share of the readings that have to be predicted for that (a choice)."""
 
@@ -65,14 +70,20 @@ def notes_on_units(
     if not recorded:
         return
     as_read, variance = _power(measured - predicted()), float(np.nanvar(measured))
+
+    def left_by(name: str, factor: float, offset: float) -> float:
+        converted = recording.with_channels(**{name: factor * recording.channel(name) + offset})
+        try:
+            return _power(measured - predict(converted))
+        except (RecordingError, SimulationError):
+            return float("inf")
+
     for name, stated in recorded if as_read > LEFT_AS_READ * variance else ():
         for factor, offset, unit in CONVERSIONS[stated]:
-            converted = recording.with_channels(**{name: factor * recording.channel(name) + offset})
-            try:
-                left = _power(measured - predict(converted))
-            except (RecordingError, SimulationError):
+            left = left_by(name, factor, offset)
+            if left >= LEFT_CONVERTED * as_read:
                 continue
-            if left < LEFT_CONVERTED * as_read:
+            if offset or factor > 1 or left < LEFT_SHRUNK * left_by(name, 0.0, 0.0):
                 told = (
                     f"{name} is likely in {unit}: converted from that, the simulation leaves {left / as_read:.1g} of "
                     f"the mean square that it leaves of {simulation.channel} now. Convert the column to {stated}, or "
@@ -86,5 +97,5 @@ def notes_on_units(
 
 def _power(left: Array) -> float:
     """Return the mean square of what is known of a difference (time, wheel); infinite where hardly anything is."""
-    known = np.isfinite(left)
+    known = np.isfinite(left) & (np.abs(left) < BEYOND_ALL)
     return float(np.mean(left[known] ** 2)) if np.mean(known) > LEAST_KNOWN else float("inf")

@@ -22,7 +22,12 @@ from regolithd.calibration.mismatch.regression.candidate_groups import with_cand
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
-from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, entry_cost, passes_entry_test
+from regolithd.calibration.mismatch.selection.best_subsets import (
+    best_of_each_smooth_term,
+    best_subsets,
+    entry_cost,
+    passes_entry_test,
+)
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
 from regolithd.calibration.mismatch.selection.implausible_effects import drop_what_the_implausible_explains
 from regolithd.calibration.mismatch.selection.noise_estimation import (
@@ -273,13 +278,14 @@ def answer_names(terms: Sequence[Term]) -> frozenset[str]:
 def without_name(decision: Decision, index: int) -> Decision:
     """Return the decision without one of its named effects, which held-out readings refused.
 
-    What it leaves is held against the smooth terms again, by the noise beside all that is significant: that beside the
-    name has in it what the name did not explain.
+    What it leaves is held against the smooth terms again, by the noise beside the best of these: that beside the name has
+    in it what the name did not explain.
     """
     threshold, refused = decision.entry_threshold, decision.refused | {names_of(decision)}
-    equations = decision.equations
-    equations = equations.weighted(noise_of_whitened(equations.design, noise_left(equations)).weights)
-    kept = equations.fit(decision.named.without(index))
+    equations, kept = decision.equations, decision.named.without(index)
+    curve = [term for _, term in best_of_each_smooth_term(equations, kept)[:1]]
+    equations, _ = _beside_all_found(equations, equations.fit((*kept, *curve)))
+    kept = equations.fit(kept)
     named, unnamed = weigh_against_smooth_terms(equations, kept, (), threshold)
     equations, noise = _beside_all_found(equations, equations.fit((*named.terms, *unnamed)))
     named, whole = equations.fit(named.terms), equations.fit((*named.terms, *unnamed))

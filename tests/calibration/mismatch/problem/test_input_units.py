@@ -63,6 +63,20 @@ def test_a_simulation_that_predicts_nothing_by_a_unit_is_an_error() -> None:
         build_problem(from_columns({**columns(), "ramp_rad": np.rad2deg(RAMP_RAD)}), Climbing())
 
 
+class Loaded(Climbing):
+    """A simulation with a part that the machine does not have, a hundred times the current."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the current, and what the ramp does not add."""
+        return super().predict(inputs, values) + 3000 * inputs["ramp_rad"]
+
+
+def test_an_input_that_should_do_less_is_no_other_unit() -> None:
+    """In degrees a spurious part would be 57 times smaller, and still spurious."""
+    notes = build_problem(from_columns(columns()), Loaded()).recording.notes
+    assert not any("is likely in" in note for note in notes)
+
+
 @pytest.mark.parametrize("left_out", [0.0, 2.0, 8.0])
 def test_what_is_left_out_is_no_other_unit(left_out: float) -> None:
     """However large it is."""
