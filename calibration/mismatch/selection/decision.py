@@ -278,7 +278,7 @@ def answer_names(terms: Sequence[Term]) -> frozenset[str]:
 def without_name(decision: Decision, index: int) -> Decision:
     """Return the decision without one of its named effects, which held-out readings refused.
 
-    What it leaves is held against the smooth terms again, by the noise beside the best of these: that beside the name has
+    What it leaves is held against the smooth terms again, by the noise beside the best of these: beside the name it has
     in it what the name did not explain.
     """
     threshold, refused = decision.entry_threshold, decision.refused | {names_of(decision)}
