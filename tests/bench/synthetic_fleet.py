@@ -123,9 +123,9 @@ def equations_of(drives: Sequence[Drive], rover: Sequence[int], level: Level = "
 
 
 def term(group: GridGroup, course: Course, rovers: Sequence[int] = (0,), wheels: Sequence[int] = ALL) -> FleetTerm:
-    """Return a term on one rover's wheels, or on all of them where there are several rovers."""
-    alone = "rover" if len(wheels) == len(WHEELS) else "one"
-    return FleetTerm(group, Units(tuple(rovers), tuple(wheels), "fleet" if len(rovers) > 1 else alone), course)
+    """Return a term of one size on some wheels of some rovers."""
+    units = Units(tuple(rovers), tuple(wheels), "all" if len(wheels) == len(WHEELS) else "one")
+    return FleetTerm(group, units, course)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -37,14 +37,15 @@ class Units:
 
     Attributes
     ----------
-    rovers: indices
-    wheels: indices
-    kind: "fleet" and "each rover" are all wheels of all rovers, with one size or one for each; then one rover's
+    rovers, wheels: indices
+    sharing: whether these are all wheels of each rover, some, or one
+    each: whether each rover has a size of its own
     """
 
     rovers: tuple[int, ...]
     wheels: tuple[int, ...]
-    kind: Literal["fleet", "each rover", "rover", "some", "one"]
+    sharing: Literal["all", "some", "one"] = "all"
+    each: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class FleetTerm:
         rovers, wheels = self.units.rovers, self.units.wheels
         if self.group.of_wheels:
             return tuple(((rover,), (wheel,)) for rover in rovers for wheel in wheels)
-        return tuple(((rover,), wheels) for rover in rovers) if self.units.kind == "each rover" else ((rovers, wheels),)
+        return tuple(((rover,), wheels) for rover in rovers) if self.units.each else ((rovers, wheels),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +193,18 @@ class FleetEquations:
         if base:
             gained -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
         return FleetFit(terms, at, by, solved, inverse, gained, tuple(spans))
+
+    def held_by_last(self, fit: FleetFit, index: int, with_last: FleetFit, used: Array) -> float:
+        """Return the Δχ² that the last term of a larger fit has in common with one of a fit, beside the parameters."""
+        base, last = len(self.parameter_factors[0]), with_last.spans[-1].start
+        matrix, _ = self._normal(with_last.columns, with_last.factors, used)
+        matrix[range(base), range(base)] += self.parameter_factors[2]
+        inverse = pseudo_inverse(matrix[:base, :base], SINGULAR) if base else np.zeros((0, 0))
+        beside = schur_complement(matrix[base:, base:], matrix[:base, base:], inverse)
+        size = np.zeros(last - base)
+        size[fit.spans[index].start - base : fit.spans[index].stop - base] = fit.coefficients[fit.spans[index]]
+        common = beside[last - base :, : last - base] @ size
+        return float(common @ pseudo_inverse(beside[last - base :, last - base :], SINGULAR) @ common)
 
     def _normal(self, at: NDArray[np.int64], by: Array, used: Array) -> tuple[Array, Array]:
         """Return matrix and moment, summed recording by recording in their order: always the same sum."""

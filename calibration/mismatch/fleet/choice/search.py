@@ -7,6 +7,7 @@ its coefficients, and for having been chosen among shapes, rovers, wheels and da
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,21 +54,24 @@ class Place:
 
 
 def places_of(equations: FleetEquations) -> list[Place]:
-    """Return all sets of units: the fleet, each rover, and single wheels and sets of wheels of each rover."""
-    rovers = tuple(range(len(equations.recordings_of)))
+    """Return all sets of units: the fleet and each rover, with all of their wheels, single ones and sets of them."""
+    count = len(equations.recordings_of)
+    of = [(rover,) for rover in range(count)]
     wheels = tuple(range(len(equations.wheels)))
-    sets = [Units(rovers, wheels, "fleet")] if len(rovers) > 1 else []
-    for rover in rovers:
-        sets.append(Units((rover,), wheels, "rover"))
+    sets = []
+    for rovers in [tuple(range(count)), *of] if count > 1 else of:
+        sets.append(Units(rovers, wheels))
         if len(wheels) > 1:
-            sets += [Units((rover,), (wheel,), "one") for wheel in wheels]
-            sets += [Units((rover,), some, "some") for some in _wheel_sets(equations)]
-    found = []
-    for units in sets:
-        at = equations.of_rovers(units.rovers)
-        begins, stands = (_told_apart(equations, units, courses_over(at, begins=kind)) for kind in (True, False))
-        found.append(Place(units, at, begins, stands))
-    return found
+            sets += [Units(rovers, (wheel,), "one") for wheel in wheels]
+            sets += [Units(rovers, some, "some") for some in sorted(_wheel_sets(equations))]
+    return [place_of(equations, units) for units in sets]
+
+
+def place_of(equations: FleetEquations, units: Units) -> Place:
+    """Return a set of units with the courses that an effect may have there."""
+    at = equations.of_rovers(units.rovers)
+    begins, stands = (_told_apart(equations, units, courses_over(at, begins=kind)) for kind in (True, False))
+    return Place(units, at, begins, stands)
 
 
 def _told_apart(equations: FleetEquations, units: Units, courses: Sequence[Course]) -> tuple[Course, ...]:
@@ -100,13 +104,11 @@ def penalty(equations: FleetEquations, term: FleetTerm, thresholds: Thresholds =
     total += course_cost(term.course)
     if term.course.kind != "always":
         total += 2 * float(np.log(len(courses_over(equations.of_rovers(units.rovers), begins=group.begins))))
-    rovers = len(equations.recordings_of)
-    choices = (rovers if rovers > 1 and units.kind not in {"fleet", "each rover"} else 1) * (
-        len(equations.wheels) if units.kind in {"one", "some"} else 1
-    )
+    choices = comb(len(equations.recordings_of), len(units.rovers))
+    if units.sharing != "all":
+        choices *= len(equations.wheels)
+        total += thresholds.single_wheel_penalty if "all" in group.candidate.sharing else 0.0
     total += 2 * float(np.log(2 * choices)) if choices > 1 else 0.0
-    if units.kind in {"one", "some"} and "all" in group.candidate.sharing:
-        total += thresholds.single_wheel_penalty
     return total
 
 
@@ -128,9 +130,9 @@ def score(equations: FleetEquations, fit: FleetFit) -> float:
 def may_share(group: GridGroup, units: Units, wheel_count: int) -> bool:
     """Return whether a candidate may be on such units; where a machine has one wheel, on that."""
     sharing = group.candidate.sharing
-    if units.kind == "one":
+    if units.sharing == "one":
         return "one" in sharing
-    if units.kind == "some":
+    if units.sharing == "some":
         return len(sharing) > 1
     return "all" in sharing or wheel_count == 1
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.fleet.choice.search import MOST_TERMS, TRIED, further, score
 from regolithd.calibration.mismatch.regression.residuals import active_size
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
@@ -60,11 +61,22 @@ class Chooser:
         return None
 
     def _worthwhile(self, less: FleetFit, more: FleetFit) -> bool:
-        """Return whether the last effect gains enough beside those on the same rovers: no law is exact."""
-        rovers = set(more.terms[-1].units.rovers)
-        others = [k for k, term in enumerate(less.terms) if rovers & set(term.units.rovers)]
-        beside = sum(less.delta_chi2 - self.equations.fit(without(less, k)).delta_chi2 for k in others)
-        return more.delta_chi2 - less.delta_chi2 > FURTHER_SHARE * beside
+        """Return whether the last effect gains enough beside those on the same rovers: no law is exact.
+
+        Of a delay counts what the last effect can hold of its misfit (`law_misfit.explained_beside`).
+        """
+        equations, last = self.equations, more.terms[-1]
+        here = np.isin(equations.rover, last.units.rovers).astype(np.float64)
+        with_it, told = (equations.fit(fit.terms, here) for fit in (more, less))
+        holds_all = last.name == SensorDelay.name or last.group.candidate.imitated_over == "torque"
+        beside = 0.0
+        for index, term in enumerate(less.terms):
+            if set(term.units.rovers) & set(last.units.rovers):
+                explained = told.delta_chi2 - equations.fit(without(less, index), here).delta_chi2
+                if term.name == SensorDelay.name and not holds_all:
+                    explained = min(explained, equations.held_by_last(told, index, with_it, here))
+                beside += explained
+        return with_it.delta_chi2 - told.delta_chi2 > FURTHER_SHARE * beside
 
     def _searched_anew(self, fit: FleetFit) -> FleetFit:
         """Return the fit with each term replaced by the best one on overlapping units beside the others."""
@@ -72,13 +84,33 @@ class Chooser:
             rest, old = self.equations.fit(without(fit, index)), fit.terms[index]
             near = [place for place in self.places if set(place.units.rovers) & set(old.units.rovers)]
             trials = [term for _, term in further(self.equations, rest, near)[:2]]
-            if old.units.kind == "fleet" and old.course.kind == "always" and not old.group.of_wheels:
-                trials.append(replace(old, units=replace(old.units, kind="each rover")))
+            trials += self._on_fewer_rovers(rest, old, index)
             for term in trials:
                 trial = self.equations.fit((*rest.terms[:index], term, *rest.terms[index:]))
                 if score(self.equations, trial) > score(self.equations, fit) + 1e-6 and self.acceptable(trial):
                     fit = trial
         return fit
+
+    def _on_fewer_rovers(self, rest: FleetFit, old: FleetTerm, index: int) -> list[FleetTerm]:
+        """Return a term of several rovers with a size of each one's own, and on those rovers alone that show it."""
+        if len(old.units.rovers) < 2 or old.group.of_wheels:
+            return []
+        each = replace(old, units=replace(old.units, each=True))
+        fit = self.equations.fit((*rest.terms[:index], each, *rest.terms[index:]))
+        shown = self._certain(fit, index)
+        rovers = tuple(rover for rover, certain in zip(old.units.rovers, shown, strict=True) if certain)
+        on = replace(old.units, rovers=rovers, each=False)
+        some = [replace(old, units=on), replace(old, units=replace(on, each=True))]
+        fewer = 0 < len(rovers) < len(old.units.rovers)
+        return [*([each] if old.course.kind == "always" else []), *(some if fewer else [])]
+
+    def _certain(self, fit: FleetFit, index: int) -> NDArray[np.bool_]:
+        """Return which sizes of a term have their signs, and are further from 0 than the entry asks for."""
+        term, span = fit.terms[index], fit.spans[index]
+        sizes = fit.coefficients[span].reshape(-1, len(term.group.columns))
+        variances = np.diag(fit.covariance)[span].reshape(sizes.shape)
+        signed = np.all(np.array(term.group.signs) * sizes >= 0, axis=1)
+        return np.asarray(signed & (np.max(sizes**2 / variances, axis=1) >= self.entry_threshold))
 
     def acceptable(self, fit: FleetFit) -> bool:
         """Return whether every coefficient has its sign, every effect is large enough, and each law has one shape."""
@@ -88,14 +120,11 @@ class Chooser:
     def acceptable_term(self, fit: FleetFit, index: int) -> bool:
         """Return whether an effect has its signs, is large enough, and on each rover whose size is its own certain."""
         term, span = fit.terms[index], fit.spans[index]
-        signs, count = term.group.signs, len(term.group.columns)
-        sizes = fit.coefficients[span].reshape(-1, count)
-        if np.any(np.array(signs) * sizes < 0):
-            return False
-        if term.units.kind == "each rover":
-            variances = np.diag(fit.covariance)[span].reshape(-1, count)
-            if np.any(np.max(sizes**2 / variances, axis=1) < self.entry_threshold):
+        if term.units.each:
+            if not self._certain(fit, index).all():
                 return False
+        elif np.any(np.array(term.group.signs) * fit.coefficients[span].reshape(-1, len(term.group.columns)) < 0):
+            return False
         return relative_size(self.equations, fit, index) >= THRESHOLDS.smallest_effect
 
     def _confirmed(self, fit: FleetFit) -> FleetFit:
@@ -109,18 +138,23 @@ class Chooser:
         return fit
 
     def _transfer_margin(self, fit: FleetFit, index: int) -> float:
-        """Return by how much a term's Δχ² on recordings that did not fit it passes the share that is asked for."""
+        """Return by how much a term's Δχ² on recordings that did not fit it passes the share that is asked for.
+
+        Of a gain that the priors alone pay (a parameter need not stray) no recording can give anything back: only what
+        the readings gained is asked for.
+        """
         equations, rest, term = self.equations, without(fit, index), fit.terms[index]
         if max(len(equations.of_rovers(rovers)) for rovers, _ in term.parts) < FEWEST_TO_CONFIRM:
             return 0.0
         weights = equations.weights * equations.reductions[:, term.group.columns[0], None]
-        came_back, gained = 0.0, fit.delta_chi2 - equations.fit(rest).delta_chi2
-        for fold in folds_of(equations):
-            with_it, less = (equations.fit(terms, 1.0 - fold) for terms in (fit.terms, rest))
-            saved = (equations.squares(less) - equations.squares(with_it)) * weights
-            came_back += float(fold @ saved.sum(axis=1))
+
+        def saved(used: Array | None = None) -> Array:
+            with_it, less = (equations.fit(terms, used) for terms in (fit.terms, rest))
+            return np.asarray(((equations.squares(less) - equations.squares(with_it)) * weights).sum(axis=1))
+
+        came_back = sum(float(fold @ saved(1.0 - fold)) for fold in folds_of(equations))
         loss = THRESHOLDS.coefficient_cost * (fit.spans[index].stop - fit.spans[index].start)
-        return came_back + loss - THRESHOLDS.transferred_share * gained
+        return came_back + loss - THRESHOLDS.transferred_share * float(saved().sum())
 
 
 def _one_shape(one: FleetTerm, other: FleetTerm) -> bool:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Indistinguishable
-from regolithd.calibration.mismatch.fleet.choice.search import further, score
+from regolithd.calibration.mismatch.fleet.choice.search import further, place_of, score
 from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.inference.experiment import as_it_runs
 from regolithd.calibration.mismatch.inference.identifiability import wrong_choice_rate
@@ -42,9 +43,9 @@ def rivals(
 def _in_its_place(chooser: Chooser, fit: FleetFit, index: int) -> list[FleetTerm]:
     equations, term = chooser.equations, fit.terms[index]
     rest = equations.fit(without(fit, index))
-    same = [place for place in chooser.places if place.units == term.units]
+    there = place_of(equations, replace(term.units, each=False))
     members = []
-    for _, rival in further(equations, rest, same)[: THRESHOLDS.rivals_tried]:
+    for _, rival in further(equations, rest, [there])[: THRESHOLDS.rivals_tried]:
         trial = equations.fit((*rest.terms, rival))
         if rival.name != term.name and chooser.acceptable(trial) and _could_be_true(equations, fit, trial):
             members.append(rival)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 ROVER = (0, 1, 0, 1, 0)
 TERMS = (
-    FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always")),
+    FleetTerm(DRAG, Units((0, 1), (0, 1), each=True), Course("always")),
     term(WEAR, Course("growing", 2), wheels=(1,)),
     term(WAVE, Course("since", 1), rovers=(0, 1)),
 )
@@ -178,9 +178,9 @@ def test_a_law_whose_wheels_have_coefficients_of_their_own_has_them_on_each_whee
     expected = [[0.2, 0], [0, 0.3], [0.2, 0], [0, -0.3]]
     np.testing.assert_allclose(fit.coefficients[fit.spans[0]].reshape(4, 2), expected, atol=0.05)
     gains = {
-        each.units.kind: value + penalty(of, each) for value, each in further(of, of.fit(()), places_of(of), [own])
+        each.units.rovers: value + penalty(of, each) for value, each in further(of, of.fit(()), places_of(of), [own])
     }
-    assert gains["fleet"] == pytest.approx(of.fit((replace(one, course=Course("always")),)).delta_chi2, rel=0.05)
+    assert gains[0, 1] == pytest.approx(of.fit((replace(one, course=Course("always")),)).delta_chi2, rel=0.05)
 
 
 def test_where_noise_is_less_a_law_counts_more(drives: list[Drive]) -> None:

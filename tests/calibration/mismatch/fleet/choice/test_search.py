@@ -23,21 +23,18 @@ ROVER = (0, 1, 0, 1, 0, 1)
 CONCEALED = {**on_both(1, 0.1), (2, 1): 0.2, (3, 0): 0.15, (4, 1): -0.1}
 DRIVES = [drive(10 + n, CONCEALED if n >= 2 else {(1, 0): 0.05}) for n in range(6)]
 EQUATIONS = equations_of(DRIVES, ROVER)
-WHOLE_FLEET, FIRST_ROVER = Units((0, 1), (0, 1), "fleet"), Units((0,), (0, 1), "rover")
+WHOLE_FLEET, FIRST_ROVER = Units((0, 1), (0, 1)), Units((0,), (0, 1))
 
 
 def test_an_effect_may_be_on_the_fleet_a_rover_or_a_wheel() -> None:
     """Each with its recordings in the order of time."""
     places = places_of(EQUATIONS)
-    assert [(place.units.kind, place.units.rovers, place.units.wheels) for place in places] == [
-        ("fleet", (0, 1), (0, 1)),
-        *(
-            row
-            for rover in (0, 1)
-            for row in (("rover", (rover,), (0, 1)), ("one", (rover,), (0,)), ("one", (rover,), (1,)))
-        ),
+    assert [(place.units.rovers, place.units.sharing, place.units.wheels) for place in places] == [
+        (rovers, *of_wheels)
+        for rovers in ((0, 1), (0,), (1,))
+        for of_wheels in (("all", (0, 1)), ("one", (0,)), ("one", (1,)))
     ]
-    assert [place.recordings for place in places] == [(0, 1, 2, 3, 4, 5), *[(0, 2, 4)] * 3, *[(1, 3, 5)] * 3]
+    assert [place.recordings for place in places] == [*[(0, 1, 2, 3, 4, 5)] * 3, *[(0, 2, 4)] * 3, *[(1, 3, 5)] * 3]
 
 
 def test_wheels_that_share_an_effect_are_a_place_of_their_own() -> None:
@@ -52,8 +49,8 @@ def test_wheels_that_share_an_effect_are_a_place_of_their_own() -> None:
         weights=np.ones(3),
     )
     equations = fleet_equations([three], [0], [0.0], GROUPS, "rover")
-    kinds = [(place.units.kind, place.units.wheels) for place in places_of(equations)]
-    assert kinds == [("rover", (0, 1, 2)), ("one", (0,)), ("one", (1,)), ("one", (2,)), ("some", (0, 2))]
+    kinds = [(place.units.sharing, place.units.wheels) for place in places_of(equations)]
+    assert kinds == [("all", (0, 1, 2)), ("one", (0,)), ("one", (1,)), ("one", (2,)), ("some", (0, 2))]
 
 
 def test_a_fleet_s_effect_begins_at_a_date_that_every_rover_has_seen() -> None:
@@ -107,7 +104,7 @@ def test_an_effect_of_the_wrong_sign_gains_nothing() -> None:
     ("one", "expected"),
     [
         (FleetTerm(DRAG, WHOLE_FLEET, Course("always")), 2.0),
-        (FleetTerm(DRAG, replace(WHOLE_FLEET, kind="each rover"), Course("always")), 2 * 2.0),
+        (FleetTerm(DRAG, replace(WHOLE_FLEET, each=True), Course("always")), 2 * 2.0),
         (FleetTerm(WAVE, WHOLE_FLEET, Course("always")), 2 * 2.0),
         (FleetTerm(DRAG, FIRST_ROVER, Course("always")), 2.0 + 2 * np.log(2 * 2)),
         (FleetTerm(DRAG, FIRST_ROVER, Course("since", 2)), 2.0 + 2 * np.log(2 * 2) + 2 * np.log(5)),
@@ -125,7 +122,7 @@ def test_a_term_pays_for_its_shapes_and_for_being_hardly_possible() -> None:
     group = replace(DRAG, tried=3)
     sums = [replace(DRIVES[n].sums(), penalties=np.array([4.0 * n, 0.0, 0.0])) for n in range(2)]
     equations = fleet_equations(sums, (0, 0), (0.0, 1.0), (group, WEAR, WAVE), "rover")
-    one = FleetTerm(group, Units((0,), (0, 1), "rover"), Course("always"))
+    one = FleetTerm(group, Units((0,), (0, 1)), Course("always"))
     assert penalty(equations, one) == pytest.approx(2.0 + 2 * np.log(3) + 4.0)
     fit = equations.fit((one,))
     assert score(equations, fit) == pytest.approx(fit.delta_chi2 - penalty(equations, one))
@@ -134,16 +131,15 @@ def test_a_term_pays_for_its_shapes_and_for_being_hardly_possible() -> None:
 @pytest.mark.parametrize(
     ("group", "kinds"),
     [
-        (DRAG, {"fleet", "each rover", "rover", "some", "one"}),
+        (DRAG, {"all", "some", "one"}),
         (WEAR, {"one"}),
-        (WAVE, {"fleet", "each rover", "rover"}),
+        (WAVE, {"all"}),
     ],
 )
 def test_a_candidate_says_on_which_wheels_it_may_be(group: object, kinds: set[str]) -> None:
     """A machine with one wheel has every effect on that."""
-    every = ("fleet", "each rover", "rover", "some", "one")
-    assert {kind for kind in every if may_share(group, Units((0,), (0,), kind), 2)} == kinds  # type: ignore[arg-type]
-    assert may_share(WEAR, Units((0,), (0,), "rover"), 1)
+    assert {kind for kind in ("all", "some", "one") if may_share(group, Units((0,), (0,), kind), 2)} == kinds  # type: ignore[arg-type]
+    assert may_share(WEAR, Units((0,), (0,)), 1)
 
 
 @pytest.mark.parametrize(("last", "kind"), [(0.35, "since"), (0.6, "growing")])

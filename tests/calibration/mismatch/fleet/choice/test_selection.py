@@ -34,7 +34,9 @@ def chooser(of: FleetEquations) -> Chooser:
 
 def told(terms: Sequence[FleetTerm]) -> list[tuple[object, ...]]:
     """Return name, rovers, wheels and course of terms."""
-    return sorted((t.name, t.units.kind, t.units.rovers, t.units.wheels, t.course.kind, t.course.first) for t in terms)
+    return sorted(
+        (t.name, t.units.sharing, t.units.rovers, t.units.wheels, t.course.kind, t.course.first) for t in terms
+    )
 
 
 def test_nothing_is_named_where_nothing_is_concealed() -> None:
@@ -48,8 +50,8 @@ def test_effects_have_their_rovers_wheels_and_dates() -> None:
     both = {n: of_all | (on_both(1, 0.12) if n in {4, 6, 8} else {}) for n in range(10)}
     worn = {n: both[n] | ({(2, 1): 0.15} if n in {5, 7, 9} else {}) for n in range(10)}
     assert told(chooser(equations(worn)).chosen().terms) == [
-        ("steady-drag", "rover", (0,), (0, 1), "since", 4),
-        ("wave", "fleet", (0, 1), (0, 1), "always", 0),
+        ("steady-drag", "all", (0,), (0, 1), "since", 4),
+        ("wave", "all", (0, 1), (0, 1), "always", 0),
         ("wear", "one", (1,), (1,), "since", 5),
     ]
 
@@ -58,15 +60,44 @@ def test_a_size_of_each_rover_s_own_is_told_from_one_size() -> None:
     """Where rovers differ by more than the noise, each has its own."""
     of = equations({n: on_both(1, 0.2 if n % 2 else 0.3) for n in range(10)})
     (one,) = chooser(of).chosen().terms
-    assert (one.name, one.units.kind, one.course.kind) == ("steady-drag", "each rover", "always")
+    assert (one.name, one.units.rovers, one.units.each, one.course.kind) == ("steady-drag", (0, 1), True, "always")
 
 
 def test_each_rover_must_show_an_effect_of_its_own_size() -> None:
     """A size that is nothing beside its error is none, although the other rover's is large."""
     of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
-    each = FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always"))
+    each = FleetTerm(DRAG, Units((0, 1), (0, 1), each=True), Course("always"))
     assert not chooser(of).acceptable(of.fit((each,)))
     assert chooser(of).acceptable(of.fit((term(DRAG, Course("always")),)))
+
+
+def test_an_effect_of_some_rovers_is_on_those_alone() -> None:
+    """Over all of a fleet it gains more than on any single rover, and the others' parameters would pay for it."""
+    rovers = tuple(n % 4 for n in range(16))
+    drives = [drive(100 + n, on_both(1, 0.2) if n % 4 < 2 else {}) for n in range(16)]
+    of = equations_of(drives, rovers)
+    found = chooser(of).chosen().terms
+    assert {(one.name, rover) for one in found for rover in one.units.rovers} == {
+        ("steady-drag", 0),
+        ("steady-drag", 1),
+    }
+
+
+def test_an_effect_may_be_on_one_wheel_of_all_rovers() -> None:
+    """One term, of one size."""
+    of = equations({n: {(1, 0): 0.2} for n in range(10)})
+    (one,) = chooser(of).chosen().terms
+    assert (one.name, one.units.rovers, one.units.wheels, one.units.each) == ("steady-drag", (0, 1), (0,), False)
+
+
+def test_what_a_prior_alone_pays_need_not_come_back() -> None:
+    """A parameter that acts as the effect does takes nearly all of it up in recordings that did not fit it."""
+    drives = [drive(100 + n, on_both(1, 0.2)) for n in range(10)]
+    for each in drives:
+        each.columns[0] = each.columns[1] + 0.01 * each.columns[0]
+    sums = [replace(each.sums(), prior_stds=np.array([0.02])) for each in drives]
+    of = fleet_equations(sums, ROVER, range(10), GROUPS, "rover")
+    assert {one.name for one in chooser(of).chosen().terms} == {"steady-drag"}
 
 
 def test_an_effect_too_small_to_matter_is_not_acceptable() -> None:
@@ -135,7 +166,7 @@ def test_an_effect_is_searched_anew_beside_a_later_one() -> None:
     """One that was taken for the fleet's belongs to the rover that has it, once that fits better."""
     of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
     taken = of.fit((term(DRAG, Course("always"), rovers=(0, 1)),))
-    assert told(chooser(of)._searched_anew(taken).terms) == [("steady-drag", "rover", (0,), (0, 1), "always", 0)]
+    assert told(chooser(of)._searched_anew(taken).terms) == [("steady-drag", "all", (0,), (0, 1), "always", 0)]
 
 
 def test_what_cannot_be_improved_stays() -> None:

@@ -38,7 +38,7 @@ def test_the_size_is_that_of_least_squares_in_the_recording_alone() -> None:
 def test_each_rover_s_recordings_are_beside_its_own_size() -> None:
     """Of an effect with a size for each rover."""
     of = equations_of([drive(n, on_both(1, 0.4 if n % 2 else 0.1)) for n in range(4)], (0, 1, 0, 1))
-    fit = of.fit((FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always")),))
+    fit = of.fit((FleetTerm(DRAG, Units((0, 1), (0, 1), each=True), Course("always")),))
     found = dict(estimates_of(of, fit, 0))
     assert [round(found[i].value, 1) for i in range(4)] == [0.1, 0.4, 0.1, 0.4]
 

@@ -98,7 +98,7 @@ def season() -> Chosen:
     of_recordings = [found(left_out), found(left_out), *[found()] * 6]
     of_recordings[3] = found(shown, own, curve)
     terms = (
-        FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always")),
+        FleetTerm(DRAG, Units((0, 1), (0, 1), each=True), Course("always")),
         term(WEAR, Course("growing", 4), wheels=(1,)),
         term(WAVE, Course("until", 5), rovers=(1,)),
     )
@@ -122,9 +122,10 @@ def test_parameters_have_the_units_of_the_machine() -> None:
     """A speed in the law is in the unit of the column that is the speed, as in the answer of one recording."""
     drives = [drive(n, on_both(1, 0.3)) for n in range(4)]
     group = replace(DRAG, candidate=StribeckFriction(), shape={"stribeck_speed_rad_s": 0.05, "fades": "exponent 1"})
-    always = FleetTerm(group, Units((0,), (0, 1), "fleet"), Course("always"))
+    always = FleetTerm(group, Units((0,), (0, 1)), Course("always"))
     in_metres = replace(found(), labels={"wheel_speed": "carriage speed (m/s)"})
-    (effect,) = answer_of_fleet(chosen(equations_of(drives, (0,) * 4), (always,), [in_metres] * 4)).effects
+    equations = replace(equations_of(drives, (0,) * 4), groups=(group, *GROUPS[1:]))
+    (effect,) = answer_of_fleet(chosen(equations, (always,), [in_metres] * 4)).effects
     assert effect.parameters["stribeck_speed_rad_s"].unit == "m/s"
     assert effect.form == "exponential"
     assert effect.statement.startswith(
@@ -198,7 +199,7 @@ def test_the_smallest_effect_that_shows_is_where_it_would_be_found() -> None:
     told = {one.name: one.smallest_detectable for one in answer_of_fleet(nothing).sensitivity}
     assert list(told) == ["steady-drag", "wave", "wear"]
     equations = nothing.equations
-    drag = FleetTerm(DRAG, Units((0, 1), (0, 1), "fleet"), Course("always"))
+    drag = FleetTerm(DRAG, Units((0, 1), (0, 1)), Course("always"))
     needed = np.sqrt(8.0 + penalty(equations, drag)) + 1.2816
     readings = 8 * 120 * 2
     mean_square = np.mean([each.gram[:, 1, 1] for each in equations.sums]) / 120
