@@ -73,6 +73,7 @@ def left_out(
             faults.saturated,
             "at the end of the sensor's range, where the furthest readings are all the same, or predicted near it",
         ),
+        (faults.stuck, "the sensor is stuck: exactly the same reading again and again, while the prediction changes"),
         *((blank, f"{word_for(name, labels)} was not measured there") for name, blank in blanks.items()),
     ]
     return tuple(LeftOut(channel, int(where.sum()), reason) for where, reason in reasons if where.any())

@@ -1,4 +1,4 @@
-"""Readings that are faults: single outliers, codes of a few in a row, and what is at a limit of the sensor."""
+"""Readings that are faults: single outliers, codes of a few in a row, a stuck sensor, and what is at its limit."""
 
 from __future__ import annotations
 
@@ -39,6 +39,9 @@ by 0.03 of them)."""
 LEAST_SPREAD = 0.25
 """Standard deviation of what is predicted of saturated readings, in those of the residual, at least (a choice): where
 one value is predicted, the machine rests there."""
+FEWEST_STUCK = 20
+"""Equal readings in a row, in those that are equal in a row elsewhere on average, from which on a sensor is stuck (a
+choice: a live one with noise repeats a value a few times, and a slow one that is held as often everywhere)."""
 OUT_OF_RANGE = 1.0
 """Ranges of all other readings beyond which a reading is out of range (a choice)."""
 
@@ -53,6 +56,7 @@ class FaultyReadings:
     codes: a few in a row that are out of the range of all others
     limited: at a limit that the prediction has too
     saturated: at a limit that the prediction does not have, or predicted to be near it
+    stuck: at one value while the prediction changes
     compared: far readings that are compared all the same
     """
 
@@ -60,6 +64,7 @@ class FaultyReadings:
     codes: Mask
     limited: Mask
     saturated: Mask
+    stuck: Mask
     compared: Mask
 
     @classmethod
@@ -74,12 +79,13 @@ class FaultyReadings:
         taken, predicted = isolated | codes, np.where(compared, prediction, np.nan)
         limited = at_common_limit(measured, predicted, residual) & ~taken
         saturated = at_own_limit(measured, np.where(taken | limited, np.nan, predicted), residual)
-        return cls(isolated, codes, limited, saturated, far & ~taken & ~limited & ~saturated)
+        stuck = at_one_value(measured, predicted, run) & ~taken & ~limited & ~saturated
+        return cls(isolated, codes, limited, saturated, stuck, far & ~taken & ~limited & ~saturated & ~stuck)
 
     @property
     def all(self) -> Mask:
         """Where a reading is not compared, for any of the reasons."""
-        return self.isolated | self.codes | self.limited | self.saturated
+        return self.isolated | self.codes | self.limited | self.saturated | self.stuck
 
 
 def far_from_prediction(residual: Array, thresholds: Thresholds) -> Mask:
@@ -198,6 +204,27 @@ def at_own_limit(measured: Array, prediction: Array, residual: Array) -> Mask:
             varied = saturated.any() and float(np.std(predicted[saturated])) > LEAST_SPREAD * deviation
             if (varied or saturated.sum() < FEWEST_SATURATED) and near.sum() <= MOST_NEAR_LIMIT * len(near):
                 found[here, wheel] |= near & saturated.any()
+    return found
+
+
+def at_one_value(measured: Array, prediction: Array, run: NDArray[np.int64]) -> Mask:
+    """Return where a sensor is stuck, shape (time, wheel): its readings are exactly equal while the prediction changes.
+
+    That changes by more than the readings elsewhere scatter from one to the next: a live sensor would show it. At zero
+    nothing is stuck (a drive that is off), nor at an end of the range (`at_own_limit`).
+    """
+    found = np.zeros(measured.shape, np.bool_)
+    for wheel in range(measured.shape[1]):
+        at = np.flatnonzero(np.isfinite(measured[:, wheel]) & np.isfinite(prediction[:, wheel]))
+        read, steps = measured[at, wheel], np.diff(measured[at, wheel])
+        parts = np.split(at, np.flatnonzero((steps != 0) | (np.diff(run[at]) != 0)) + 1)
+        scatter = robust_std(steps[steps != 0]) / np.sqrt(2) if steps.any() else np.inf
+        for part in parts:
+            value = measured[part[0], wheel] if len(part) else 0.0
+            usual = (len(at) - len(part)) / max(len(parts) - 1, 1)
+            within = value != 0 and read.min() < value < read.max()
+            if within and len(part) >= FEWEST_STUCK * usual and np.std(prediction[part, wheel]) > scatter:
+                found[part, wheel] = True
     return found
 
 

@@ -79,7 +79,7 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
         "current_A",
         measured,
         run,
-        FaultyReadings(none, none, none, none, none),
+        FaultyReadings(none, none, none, none, none, none),
         {"yaw_rate": blank},
         {"yaw_rate": "turning (rad/s)"},
     )

@@ -1,4 +1,4 @@
-"""Only single, isolated readings, codes, and readings at a limit are left out."""
+"""Only single, isolated readings, codes, a stuck sensor, and readings at a limit are left out."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from regolithd.calibration.mismatch.problem.outliers import (
     FEWEST_SATURATED,
     NEAR_LIMIT_DEVIATIONS,
     at_common_limit,
+    at_one_value,
     at_own_limit,
     codes_in_a_row,
     far_from_prediction,
@@ -154,6 +155,30 @@ def test_where_a_machine_rests_its_reading_is_not_saturated() -> None:
         limited = np.minimum(measured, limit) - (limit if share > 0.9 else 0.0)
         shifted = truth - (limit if share > 0.9 else 0.0)
         assert not at_own_limit(limited, shifted, limited - shifted).any()
+
+
+def stuck(read: np.ndarray, predicted: np.ndarray) -> int:
+    """Return how many readings of one wheel are of a stuck sensor."""
+    return int(at_one_value(read[:, None], predicted[:, None], np.zeros(len(read), np.int64)).sum())
+
+
+def test_a_stuck_sensor_is_left_out_and_a_machine_at_rest_is_not() -> None:
+    """It repeats one value exactly while the prediction changes by more than its readings scattered before."""
+    predicted = 5 + 3 * np.sin(np.arange(COUNT) / 40)
+    read = predicted + np.random.default_rng(3).normal(0, 0.3, COUNT)
+    assert stuck(read, predicted) == 0
+    still = np.where(np.arange(COUNT) >= 800, read[800], read)
+    assert stuck(still, predicted) == 200
+    assert stuck(still, np.where(np.arange(COUNT) >= 800, 5.0, predicted)) == 0
+    assert stuck(np.where(np.arange(COUNT) >= 800, 0.0, read), predicted) == 0
+
+
+@pytest.mark.parametrize("held", [10, 25])
+def test_a_slow_sensor_that_is_held_is_not_stuck(held: int) -> None:
+    """Each of its readings is repeated as often."""
+    predicted = 5 + 3 * np.sin(np.arange(COUNT) / 200)
+    read = np.repeat((predicted + np.random.default_rng(3).normal(0, 0.05, COUNT))[::held], held)[:COUNT]
+    assert stuck(read, predicted) == 0
 
 
 def test_a_few_far_readings_that_are_compared_are_told() -> None:
