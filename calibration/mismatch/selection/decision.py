@@ -285,8 +285,7 @@ def without_name(decision: Decision, index: int) -> Decision:
     equations, kept = decision.equations, decision.named.without(index)
     curve = [term for _, term in best_of_each_smooth_term(equations, kept)[:1]]
     equations, _ = _beside_all_found(equations, equations.fit((*kept, *curve)))
-    kept = equations.fit(kept)
-    named, unnamed = weigh_against_smooth_terms(equations, kept, (), threshold)
+    named, unnamed = weigh_against_smooth_terms(equations, equations.fit(kept), (), threshold)
     equations, noise = _beside_all_found(equations, equations.fit((*named.terms, *unnamed)))
     named, whole = equations.fit(named.terms), equations.fit((*named.terms, *unnamed))
     return replace(
