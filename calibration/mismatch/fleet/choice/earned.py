@@ -24,7 +24,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
     from regolithd.calibration.mismatch.fleet.work.found import Found
@@ -36,14 +36,17 @@ FEWEST_HELD_OUT = 2
 
 
 def earned(chooser: Chooser, fit: FleetFit, found: Sequence[Found]) -> FleetFit:
-    """Return the fit without the names that fall beside what single recordings show, the worst dropped first."""
+    """Return the fit without the names that fall beside what single recordings show, the worst dropped first.
+
+    A name with a size of each rover's own stays on those that show it beside that.
+    """
     while fit.terms:
         names = _Names(chooser, fit, tuple(found))
         margins = [names.margin(index) for index in range(len(fit.terms))]
         worst = int(np.argmin(margins))
         if margins[worst] > 0:
             break
-        fit = chooser.equations.fit(without(fit, worst))
+        fit = chooser.equations.fit(names.with_less(worst))
     return fit
 
 
@@ -71,6 +74,15 @@ class _Names:
         if not (self._can_be_told(index) and chooser.acceptable_term(beside, index) and self._lowers_errors(index)):
             return -np.inf
         return self._lead(index)
+
+    def with_less(self, index: int) -> tuple[FleetTerm, ...]:
+        """Return the terms without one; one with a size of each rover's own stays on those that show it beside."""
+        chooser, beside = self._beside
+        term, rovers = self.fit.terms[index], chooser.showing(beside, index)
+        if not term.units.each or rovers in {(), term.units.rovers}:
+            return without(self.fit, index)
+        on_them = replace(term, units=replace(term.units, rovers=rovers))
+        return (*self.fit.terms[:index], on_them, *self.fit.terms[index + 1 :])
 
     def _lead(self, index: int) -> float:
         """Return the lead over the answer without this name, in which recordings may leave more unexplained.

@@ -40,19 +40,34 @@ class Chooser:
     entry_threshold: float
 
     def chosen(self) -> FleetFit:
-        """Return the fit of all effects that may be named."""
+        """Return the fit of all effects that may be named.
+
+        They are searched twice, with and without effects of several rovers: of different laws on different rovers, one
+        that is none of theirs may gain most over all.
+        """
+        alone = [place for place in self.places if len(place.units.rovers) == 1]
+        searches = [self.places, alone] if 0 < len(alone) < len(self.places) else [self.places]
+        found = [self._grown(places) for places in searches]
+        return self._confirmed(max(found, key=self._evidence))
+
+    def _evidence(self, fit: FleetFit) -> float:
+        """Return the score of a fit less what its effects had to gain to enter."""
+        return score(self.equations, fit) - self.entry_threshold * len(fit.terms)
+
+    def _grown(self, places: Sequence[Place]) -> FleetFit:
+        """Return the fit of effects that were chosen one after the other, each searched anew beside the others."""
         fit = self.equations.fit(())
         while len(fit.terms) < MOST_TERMS:
-            best = self._best_further(fit)
+            best = self._best_further(fit, places)
             if best is None:
                 break
-            fit = self._searched_anew(best)
-        return self._confirmed(fit)
+            fit = self._searched_anew(best, places)
+        return fit
 
-    def _best_further(self, fit: FleetFit) -> FleetFit | None:
+    def _best_further(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit | None:
         """Return the fit with one more effect, the best that may be named; None: there is none."""
         needed = self.entry_threshold + (THRESHOLDS.further_term_entry if fit.terms else 0.0)
-        for gained, term in further(self.equations, fit, self.places)[:TRIED]:
+        for gained, term in further(self.equations, fit, places)[:TRIED]:
             if gained <= needed:
                 return None
             more = self.equations.fit((*fit.terms, term))
@@ -78,31 +93,38 @@ class Chooser:
                 beside += explained
         return with_it.delta_chi2 - told.delta_chi2 > FURTHER_SHARE * beside
 
-    def _searched_anew(self, fit: FleetFit) -> FleetFit:
+    def _searched_anew(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit:
         """Return the fit with each term replaced by the best one on overlapping units beside the others."""
         for index in range(len(fit.terms)):
             rest, old = self.equations.fit(without(fit, index)), fit.terms[index]
-            near = [place for place in self.places if set(place.units.rovers) & set(old.units.rovers)]
+            near = [place for place in places if set(place.units.rovers) & set(old.units.rovers)]
             trials = [term for _, term in further(self.equations, rest, near)[:2]]
-            trials += self._on_fewer_rovers(rest, old, index)
+            trials += self._on_fewer_rovers(fit, index)
             for term in trials:
                 trial = self.equations.fit((*rest.terms[:index], term, *rest.terms[index:]))
                 if score(self.equations, trial) > score(self.equations, fit) + 1e-6 and self.acceptable(trial):
                     fit = trial
         return fit
 
-    def _on_fewer_rovers(self, rest: FleetFit, old: FleetTerm, index: int) -> list[FleetTerm]:
+    def _on_fewer_rovers(self, fit: FleetFit, index: int) -> list[FleetTerm]:
         """Return a term of several rovers with a size of each one's own, and on those rovers alone that show it."""
-        if len(old.units.rovers) < 2 or old.group.of_wheels:
+        old = fit.terms[index]
+        if len(old.units.rovers) == 1 or old.group.of_wheels:
             return []
-        each = replace(old, units=replace(old.units, each=True))
-        fit = self.equations.fit((*rest.terms[:index], each, *rest.terms[index:]))
-        shown = self._certain(fit, index)
-        rovers = tuple(rover for rover, certain in zip(old.units.rovers, shown, strict=True) if certain)
-        on = replace(old.units, rovers=rovers, each=False)
-        some = [replace(old, units=on), replace(old, units=replace(on, each=True))]
-        fewer = 0 < len(rovers) < len(old.units.rovers)
-        return [*([each] if old.course.kind == "always" else []), *(some if fewer else [])]
+        units = replace(old.units, each=True)
+        of_all = [units] if old.course.kind == "always" else []
+        shown = replace(units, rovers=self.showing(fit, index))
+        of_some = [shown, replace(shown, each=False)] if shown.rovers not in {(), units.rovers} else []
+        return [replace(old, units=each) for each in (*of_all, *of_some)]
+
+    def showing(self, fit: FleetFit, index: int) -> tuple[int, ...]:
+        """Return the rovers of a term that show it, each with a size of its own beside the other terms."""
+        term = fit.terms[index]
+        if term.group.of_wheels:
+            return term.units.rovers
+        each = replace(term, units=replace(term.units, each=True))
+        certain = self._certain(self.equations.fit((*fit.terms[:index], each, *fit.terms[index + 1 :])), index)
+        return tuple(rover for rover, shows in zip(term.units.rovers, certain.tolist(), strict=True) if shows)
 
     def _certain(self, fit: FleetFit, index: int) -> NDArray[np.bool_]:
         """Return which sizes of a term have their signs, and are further from 0 than the entry asks for."""

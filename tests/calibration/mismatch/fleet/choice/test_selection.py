@@ -11,7 +11,7 @@ from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_bo
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetTerm, Units, fleet_equations
-from regolithd.calibration.mismatch.fleet.choice.search import places_of
+from regolithd.calibration.mismatch.fleet.choice.search import further, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
 from regolithd.calibration.mismatch.regression.residuals import active_rms
 
@@ -81,6 +81,22 @@ def test_an_effect_of_some_rovers_is_on_those_alone() -> None:
         ("steady-drag", 0),
         ("steady-drag", 1),
     }
+
+
+def test_of_different_laws_on_two_rovers_none_is_on_both() -> None:
+    """A third law that is a little of both gains most over all of the fleet."""
+    drives = [drive(100 + n, on_both(2, 0.2 - 0.06 * (n % 2)) | on_both(3, 0.2 * (n % 2))) for n in range(10)]
+    for each in drives:
+        each.columns[3] += 0.7 * each.columns[2]
+        each.columns[1] = each.columns[2] + each.columns[3] + 0.3 * each.columns[1]
+    names = ("steady-drag", "one-drag", "other-drag")
+    candidates = [type("Named", (type(DRAG.candidate),), {"name": name})() for name in names]
+    groups = [replace(DRAG, candidate=each, columns=(1 + k,)) for k, each in enumerate(candidates)]
+    sums = [replace(each.sums(), places=((1,), (2,), (3,))) for each in drives]
+    of = fleet_equations(sums, ROVER, range(10), groups, "rover")
+    assert further(of, of.fit(()), places_of(of))[0][1].name == "steady-drag"
+    found = chooser(of).chosen().terms
+    assert {(one.name, one.units.rovers) for one in found} == {("one-drag", (0,)), ("other-drag", (1,))}
 
 
 def test_an_effect_may_be_on_one_wheel_of_all_rovers() -> None:
@@ -166,14 +182,16 @@ def test_an_effect_is_searched_anew_beside_a_later_one() -> None:
     """One that was taken for the fleet's belongs to the rover that has it, once that fits better."""
     of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
     taken = of.fit((term(DRAG, Course("always"), rovers=(0, 1)),))
-    assert told(chooser(of)._searched_anew(taken).terms) == [("steady-drag", "all", (0,), (0, 1), "always", 0)]
+    assert told(chooser(of)._searched_anew(taken, places_of(of)).terms) == [
+        ("steady-drag", "all", (0,), (0, 1), "always", 0)
+    ]
 
 
 def test_what_cannot_be_improved_stays() -> None:
     """Only a better score replaces an effect."""
     of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
     fit = of.fit((term(DRAG, Course("always")), term(WEAR, Course("since", 4), wheels=(0,))))
-    assert chooser(of)._searched_anew(of.fit(fit.terms[:1])).terms == fit.terms[:1]
+    assert chooser(of)._searched_anew(of.fit(fit.terms[:1]), places_of(of)).terms == fit.terms[:1]
     assert without(fit, 0) == fit.terms[1:]
     assert without(fit, 1) == fit.terms[:1]
 
