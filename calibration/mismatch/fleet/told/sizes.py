@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
 from regolithd.calibration.mismatch.inference.intervals import OF_SIGN, unit_of
 from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,7 +42,12 @@ def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
     values, stds = values.reshape(-1, count), stds.reshape(-1, count)
     weights = 1 / np.maximum(stds, 1e-300) ** 2
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
-    return mean, np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
+    return mean, _as_a_whole(mean, np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0)))
+
+
+def _as_a_whole(sizes: Array, stds: Array) -> Array:
+    """Return standard deviations of sizes with the share by which all of them are off, as in one recording."""
+    return np.hypot(stds, THRESHOLDS.size_discrepancy_std * sizes)
 
 
 def told_sizes(group: GridGroup, values: Array, stds: Array) -> tuple[Array, Array]:
@@ -51,7 +57,7 @@ def told_sizes(group: GridGroup, values: Array, stds: Array) -> tuple[Array, Arr
     if places is None:
         return mean_sizes(values, stds, count)
     found = np.zeros((2, len(values)))
-    found[:, places.ravel()] = values, stds
+    found[:, places.ravel()] = values, _as_a_whole(values, stds)
     return found[0], found[1]
 
 

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equation
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
 from regolithd.calibration.mismatch.fleet.told.sizes import moved_law, parameters_of
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Parameter
@@ -71,12 +72,13 @@ def test_the_law_moves_to_where_the_recordings_have_it() -> None:
 
 
 def test_a_shape_without_another_one_has_no_interval() -> None:
-    """The value is told, and the size's interval is that at this shape."""
+    """The value is told, and the size's interval is that at this shape, off as a whole by as much as in one recording."""
     of, fit = season(alone=True)
     found = told(of, fit)
     assert found["power"].value == 0.75
     assert np.isnan([found["power"].low, found["power"].high]).all()
-    reach = 1.6449 * size_stds(of, fit)[fit.spans[0]][0]
+    as_a_whole = THRESHOLDS.size_discrepancy_std * found["drag"].value
+    reach = 1.6449 * np.hypot(size_stds(of, fit)[fit.spans[0]][0], as_a_whole)
     assert found["drag"].high - found["drag"].value == pytest.approx(reach, rel=1e-3)
 
 
