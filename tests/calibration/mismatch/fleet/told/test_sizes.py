@@ -72,7 +72,7 @@ def test_the_law_moves_to_where_the_recordings_have_it() -> None:
 
 
 def test_a_shape_without_another_one_has_no_interval() -> None:
-    """The value is told, and the size's interval is that at this shape, off as a whole by as much as in one recording."""
+    """The value is told, and the interval of the size at this shape, off as a whole by as much as in one recording."""
     of, fit = season(alone=True)
     found = told(of, fit)
     assert found["power"].value == 0.75
