@@ -71,5 +71,5 @@ def _matrix(decision: Decision, drawn: Drawn) -> Array:
     for place, precision in enumerate(equations.nuisance.precision):
         beyond[place, place] -= precision
     matrix = drawn.sandwich.matrix.copy()
-    matrix[:size, :size] = equations.normal_matrix(decision.whole) + beyond
+    matrix[:size, :size] = equations.normal_matrix(decision.whole.terms) + beyond
     return matrix

@@ -217,13 +217,15 @@ def at_one_value(measured: Array, prediction: Array, run: NDArray[np.int64]) -> 
     for wheel in range(measured.shape[1]):
         at = np.flatnonzero(np.isfinite(measured[:, wheel]) & np.isfinite(prediction[:, wheel]))
         read, steps = measured[at, wheel], np.diff(measured[at, wheel])
-        parts = np.split(at, np.flatnonzero((steps != 0) | (np.diff(run[at]) != 0)) + 1)
+        begins = np.flatnonzero((steps != 0) | (np.diff(run[at]) != 0)) + 1
+        edges = np.concatenate(([0], begins, [len(at)]))
+        lengths = np.diff(edges)
+        usual = (len(at) - lengths) / max(len(lengths) - 1, 1)
         scatter = robust_std(steps[steps != 0]) / np.sqrt(2) if steps.any() else np.inf
-        for part in parts:
-            value = measured[part[0], wheel] if len(part) else 0.0
-            usual = (len(at) - len(part)) / max(len(parts) - 1, 1)
+        for place in np.flatnonzero(lengths >= np.maximum(FEWEST_STUCK * usual, 1)):
+            part, value = at[edges[place] : edges[place + 1]], read[edges[place]]
             within = value != 0 and read.min() < value < read.max()
-            if within and len(part) >= FEWEST_STUCK * usual and np.std(prediction[part, wheel]) > scatter:
+            if within and np.std(prediction[part, wheel]) > scatter:
                 found[part, wheel] = True
     return found
 

@@ -160,9 +160,9 @@ class NormalEquations:
         columns = list(self.nuisance.columns)
         return np.asarray(fit.coefficients[: len(columns)] / self.design.scale[columns])
 
-    def normal_matrix(self, fit: Fit) -> Array:
-        """Return the matrix of a fit's normal equations, the priors included, shape (column, column)."""
-        return self._normal(fit.columns)[0]
+    def normal_matrix(self, terms: Iterable[Term]) -> Array:
+        """Return the matrix of the normal equations of terms, the priors included, shape (column, column)."""
+        return self._normal(self.columns_of(tuple(terms)))[0]
 
     @cached_property
     def _explained_by_parameters(self) -> float:

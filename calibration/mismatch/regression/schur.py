@@ -42,6 +42,21 @@ def schur_complement(own: Array, cross: Array, inverse: Array) -> Array:
     return own - explained_part(cross, inverse)
 
 
+def held_by_last(matrix: Array, first: int, last: int, size: Array, singular: float) -> float:
+    """Return the Δχ² that the last columns have in common with columns before them of some size, beside the first ones.
+
+    Parameters
+    ----------
+    matrix: of the normal equations, shape (column, column)
+    first, last: how many columns are first, and where the last ones begin
+    size: coefficients of the columns in between, shape (last - first,)
+    """
+    inverse = pseudo_inverse(matrix[:first, :first], singular) if first else np.zeros((0, 0))
+    beside = schur_complement(matrix[first:, first:], matrix[:first, first:], inverse)
+    common = beside[last - first :, : last - first] @ size
+    return float(common @ pseudo_inverse(beside[last - first :, last - first :], singular) @ common)
+
+
 def schur_diagonal(own_diagonal: Array, cross: Array, inverse: Array) -> Array:
     """Return the diagonal of the Schur complement alone, shape (new,): for many columns, each by itself."""
     return own_diagonal - np.einsum("sp,sp->p", cross, inverse @ cross)

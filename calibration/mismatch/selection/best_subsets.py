@@ -314,7 +314,7 @@ def _explained_beside(equations: NormalEquations, less: Fit, more: Fit) -> float
     further = [term for term in more.terms if term.group.subject not in known]
     if len(further) != len(more.terms) - len(less.terms):
         return explained(equations, less)
-    return explained_beside(equations, less, equations.fit((*less.terms, *further)))
+    return explained_beside(equations, less, further)
 
 
 def _is_bent(equations: NormalEquations, group: Group) -> bool:

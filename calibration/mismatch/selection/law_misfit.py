@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.problem.covariates import quantity
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
+from regolithd.calibration.mismatch.regression.schur import held_by_last
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,45 +38,34 @@ def misfit_beside(equations: NormalEquations, names: Fit, with_curve: Fit) -> fl
     The curve is the last term.
     """
     gain = with_curve.delta_chi2 - names.delta_chi2
-    return gain / max(explained_beside(equations, names, with_curve) + gain, 1e-9)
+    return gain / max(explained_beside(equations, names, with_curve.terms[-1:]) + gain, 1e-9)
 
 
-def explained_beside(equations: NormalEquations, names: Fit, more: Fit) -> float:
-    """Return the Δχ² of names of which the further terms of a fit, its last ones, can hold a share as their misfit.
+def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[Term]) -> float:
+    """Return the Δχ² of names of which further terms can hold a share as their misfit.
 
     What an inexact law leaves is a share of the law, reading by reading. A delay acts where the prediction changes, and
     explains more than any load there: a term that it hardly follows (a shadow over the sun's azimuth) holds little of
     what its law misses, however much it explains. What follows the prediction, or is a further delay, holds it all.
     """
     delays = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
-    further = more.terms[len(names.terms) :]
     changed = any(term.group.is_change for term in names.terms)
     follows = any(term.name == SensorDelay.name or is_of_the_prediction(equations.problem, term) for term in further)
     if not delays or changed or follows:
         return explained(equations, names)
     others = equations.fit([term for term in names.terms if term.name != SensorDelay.name])
     by_delays = names.delta_chi2 - others.delta_chi2
-    columns = sum(len(term.group.columns) for term in further)
-    held = min(_held_by_last(equations, names, delays, more, columns), by_delays)
+    size = np.zeros(len(names.columns))
+    for index in delays:
+        size[names.of_term(index)] = names.coefficients[names.of_term(index)]
+    matrix, first = equations.normal_matrix((*names.terms, *further)), len(equations.nuisance.columns)
+    held = min(held_by_last(matrix, first, len(size), size[first:], SINGULAR), by_delays)
     return explained(equations, names) - by_delays + held
 
 
 def is_of_the_prediction(problem: Problem, term: Term) -> bool:
     """Return whether a term is over the size of the prediction, or over its past."""
     return term.imitated_over in {"torque", quantity(problem.simulation.channel)} | LAGGED
-
-
-def _held_by_last(equations: NormalEquations, names: Fit, which: Sequence[int], more: Fit, columns: int) -> float:
-    """Return the Δχ² that the last columns of a fit have in common with some names, beside the free parameters."""
-    first, last = len(equations.nuisance.columns), len(more.columns) - columns
-    matrix = equations.normal_matrix(more)
-    inverse = pseudo_inverse(matrix[:first, :first], SINGULAR) if first else np.zeros((0, 0))
-    beside = schur_complement(matrix[first:, first:], matrix[:first, first:], inverse)
-    size = np.zeros(last)
-    for index in which:
-        size[names.of_term(index)] = names.coefficients[names.of_term(index)]
-    common = beside[last - first :, : last - first] @ size[first:]
-    return float(common @ pseudo_inverse(beside[last - first :, last - first :], SINGULAR) @ common)
 
 
 def as_stated(equations: NormalEquations) -> NormalEquations:

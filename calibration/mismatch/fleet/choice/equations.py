@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
+from regolithd.calibration.mismatch.regression.schur import held_by_last, pseudo_inverse
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -199,12 +199,9 @@ class FleetEquations:
         base, last = len(self.parameter_factors[0]), with_last.spans[-1].start
         matrix, _ = self._normal(with_last.columns, with_last.factors, used)
         matrix[range(base), range(base)] += self.parameter_factors[2]
-        inverse = pseudo_inverse(matrix[:base, :base], SINGULAR) if base else np.zeros((0, 0))
-        beside = schur_complement(matrix[base:, base:], matrix[:base, base:], inverse)
         size = np.zeros(last - base)
         size[fit.spans[index].start - base : fit.spans[index].stop - base] = fit.coefficients[fit.spans[index]]
-        common = beside[last - base :, : last - base] @ size
-        return float(common @ pseudo_inverse(beside[last - base :, last - base :], SINGULAR) @ common)
+        return held_by_last(matrix, base, last, size, SINGULAR)
 
     def _normal(self, at: NDArray[np.int64], by: Array, used: Array) -> tuple[Array, Array]:
         """Return matrix and moment, summed recording by recording in their order: always the same sum."""
