@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.calibration.linearised import (
     put_on_time_by,
     step_to,
     unknown_states,
+    untenable,
     worse_than_stated,
 )
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
@@ -44,7 +45,7 @@ from regolithd.calibration.mismatch.inference.evidence import empirical_fits, ev
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, beside_regions, earned
-from regolithd.calibration.mismatch.inference.improbable import in_probable_regions
+from regolithd.calibration.mismatch.inference.improbable import in_probable_regions, over_time_if_improbable
 from regolithd.calibration.mismatch.inference.initial_states import with_initial_states
 from regolithd.calibration.mismatch.inference.joint_parameters import information_of
 from regolithd.calibration.mismatch.inference.opposite_sign import notes_on_opposite_sign
@@ -229,6 +230,7 @@ def _settled(
         found = _decided(candidates, stated, pose, start, progress)
         further, decision = fed_back(found.decision), found.decision
         out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
+        out |= untenable(decision.equations, decision.whole)
         unknown = unknown_states(decision.equations, decision.whole)
         refused = decision.refused_delays(start.problem) if not further | out | unknown else frozenset()
         if not further | out | unknown | refused:
@@ -269,7 +271,8 @@ def _decided(
     regional = in_probable_regions(confined)
     if regional is not decision:
         decision, held_out = beside_regions(regional, search.grid)
-    decision, held_out = named_beside_spells(without_refuted_curves(decision, start.problem), held_out, search.grid)
+    decision = over_time_if_improbable(without_refuted_curves(decision, start.problem))
+    decision, held_out = named_beside_spells(decision, held_out, search.grid)
     decision = with_changes_beside_same_parameters(decision)
     return Decided(decision, held_out, search.candidates, search.applicable)
 

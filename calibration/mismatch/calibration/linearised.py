@@ -120,6 +120,24 @@ def beyond_their_doubt(equations: NormalEquations, fit: Fit) -> frozenset[str]:
     return frozenset(name for name, stds in away if name in sizes and stds > furthest)
 
 
+def untenable(equations: NormalEquations, fit: Fit) -> frozenset[str]:
+    """Return the told parameters that leave their priors, where the simulation does not go along with the fit.
+
+    Its tangents promise what it does not do: the values that were fitted are none. Something else acts, or an input has
+    another unit.
+    """
+    problem, priors, fitted = equations.problem, equations.problem.simulation.parameters, _fitted(equations, fit)
+    limits = problem.thresholds
+    off = {name: abs(at - priors[name].value) for name, at in fitted.items() if priors[name].told}
+    leaving = frozenset(name for name, away in off.items() if away > limits.furthest_prior_stds * priors[name].std)
+    if not leaving:
+        return leaving
+    step = Step(problem, {**problem.values, **fitted})
+    missed, promised = power(step.run - step.along), power(step.along - step.begin)
+    goes_along = not step.is_bent() or missed <= limits.form_misfit**2 * promised
+    return frozenset() if step.is_defined and goes_along else leaving
+
+
 def unknown_states(equations: NormalEquations, fit: Fit) -> frozenset[str]:
     """Return the initial states that a fit moves further than the noise of a reading does, and were not known to be."""
     nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds

@@ -86,6 +86,25 @@ def without_improbable_curves(decision: Decision) -> Decision:
     return unexplained_if_intermittent(replace(decision, unnamed=(), whole=decision.named, refused=refused))
 
 
+def over_time_if_improbable(decision: Decision) -> Decision:
+    """Return the decision, with a curve over time in the place of a "consistent" that other answers outweigh.
+
+    Its curve over another covariate was refuted by held-out readings, so that it is not that which it follows. Of what
+    happened once no other time tells, and a curve over time cannot be refuted so.
+    """
+    equations = decision.equations
+    leaving = equations.nuisance.leaving_their_priors(decision.named, equations.problem)
+    if decision.whole.terms or not decision.refused or leaving.size:
+        return decision
+    others = [each for each in alternatives(decision, refused=True) if frozenset(each.effects) not in decision.refused]
+    if probability(others, equations.thresholds) >= EVEN:
+        return decision
+    for score, curve in best_of_each_smooth_term(equations, ()):
+        if curve.name == "time" and score > equations.thresholds.smooth_term_entry:
+            return replace(decision, unnamed=(curve,), whole=equations.fit((curve,)))
+    return decision
+
+
 def _curve_like(decision: Decision, other: Alternative) -> Term | None:
     """Return the curve that can hold another answer's effect: over its covariate, on its wheels, if there is one."""
     curves = [term for _, term in best_of_each_smooth_term(decision.equations, ())]

@@ -1,4 +1,4 @@
-"""Inputs that are likely in another unit than their names say: converted, the simulation leaves far less."""
+"""Columns that are likely in another unit than their names say: converted, the simulation leaves far less."""
 
 from __future__ import annotations
 
@@ -27,8 +27,17 @@ CONVERSIONS: dict[str, tuple[tuple[float, float, str], ...]] = {
     "deg_s": ((180 / np.pi, 0.0, "rad/s"), (6.0, 0.0, "rpm")),
     "rpm": ((30 / np.pi, 0.0, "rad/s"), (60.0, 0.0, "revolutions per second")),
     "m_s": ((1 / 3.6, 0.0, "km/h"),),
-    "Pa": ((100.0, 0.0, "mbar"), (1e5, 0.0, "bar")),
-    "bar": ((1e-3, 0.0, "mbar"), (1e-5, 0.0, "Pa")),
+    "Pa": ((100.0, 0.0, "mbar"), (1e3, 0.0, "kPa"), (1e5, 0.0, "bar")),
+    "kPa": ((1e-3, 0.0, "Pa"), (0.1, 0.0, "mbar"), (100.0, 0.0, "bar")),
+    "bar": ((1e-3, 0.0, "mbar"), (1e-5, 0.0, "Pa"), (1e-2, 0.0, "kPa")),
+    "kg": ((1 / 9.80665, 0.0, "N"), (1e-3, 0.0, "g")),
+    "N": ((9.80665, 0.0, "kg"), (1e3, 0.0, "kN")),
+    "kW": ((1e-3, 0.0, "W"),),
+    "W": ((1e3, 0.0, "kW"),),
+    "A": ((1e-3, 0.0, "mA"),),
+    "V": ((1e-3, 0.0, "mV"),),
+    "m": ((1e-3, 0.0, "mm"), (1e-2, 0.0, "cm")),
+    "mm": ((1e3, 0.0, "m"),),
     "percent": ((100.0, 0.0, "shares of 1"),),
     "pct": ((100.0, 0.0, "shares of 1"),),
 }
@@ -43,6 +52,8 @@ LEFT_CONVERTED = 0.1
 LEFT_SHRUNK = 0.5
 """Share of what the simulation leaves with the input at 0, up to which a smaller unit is likely (a choice): what the
 input should not do at all, a smaller unit takes away as well."""
+LEFT_PREDICTED = 0.1
+"""The same of the predicted column, over its variance (a choice: converted, the simulation explains it well)."""
 BEYOND_ALL = 1e100
 """What no prediction reaches, in any unit."""
 LEAST_KNOWN = 0.2
@@ -55,7 +66,7 @@ def notes_on_units(
     predict: Callable[[Recording], Array],
     predicted: Callable[[], Array],
 ) -> Iterator[str]:
-    """Yield a note for each input that is likely in another unit.
+    """Yield a note for each input that is likely in another unit, and none for the predicted column.
 
     `predict` runs the simulation as it is stated; `predicted` returns what it predicts from the readings as they are.
 
@@ -65,6 +76,7 @@ def notes_on_units(
         Where the simulation, from the readings as they are, is worse than the mean of what it predicts.
     """
     measured, columns = recording.channel(simulation.channel), simulation.inputs
+    _check_predicted(simulation.channel, measured, predicted)
     mistakable = [(name, found[1]) for name in columns if (found := MISTAKABLE.fullmatch(name))]
     recorded = [(name, unit) for name, unit in mistakable if name in recording.channels]
     if not recorded:
@@ -93,6 +105,21 @@ def notes_on_units(
                     raise RecordingError(told)
                 yield f"{told}."
                 break
+
+
+def _check_predicted(channel: str, measured: Array, predicted: Callable[[], Array]) -> None:
+    """Raise an error where the predicted column is likely in another unit: its readings explain nothing as they are."""
+    stated = MISTAKABLE.fullmatch(channel)
+    if stated is None:
+        return
+    prediction, variance = predicted(), float(np.nanvar(measured))
+    for factor, offset, unit in CONVERSIONS[stated[1]]:
+        left = _power(factor * measured + offset - prediction)
+        if left < LEFT_PREDICTED * factor**2 * variance and _power(measured - prediction) > variance / 2:
+            raise RecordingError(
+                f"{channel} is likely in {unit}: converted from that, it is predicted with an error of {left**0.5:.1g} "
+                f"{stated[1]}. Convert the column to {stated[1]}, or correct the simulation if it predicts {unit}"
+            )
 
 
 def _power(left: Array) -> float:

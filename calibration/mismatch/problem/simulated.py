@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_between, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
-from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.errors_in_variables import ExpectedInputs, expected_inputs, smoothed_inputs
 from regolithd.calibration.mismatch.problem.gaps import carried_over_gaps, inputs_otherwise_in_gaps
 from regolithd.calibration.mismatch.problem.input_doubt import (
     InputDoubt,
@@ -142,14 +142,17 @@ def inputs_of(
     normal = _inputs_of_speed(as_read, simulation)
     shown = shown_errors(as_read, simulation, predict, normal)
     errors = {**simulation.sensors, **shown}
-    expected = as_read.with_channels(**smoothed) if smoothed else expected_inputs(as_read, errors, normal)
+    made = (
+        smoothed_inputs(as_read, errors, normal) if not smoothed else ExpectedInputs(as_read.with_channels(**smoothed))
+    )
+    expected = made.recording
     otherwise = None
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, errors, normal)
     predicted = cache(lambda: predict(as_read))
     between = _between_readings(recording, simulation, values, predicted)
-    doubts = (input_doubt(as_read, expected, simulation, values, errors), *(each.doubt for each in between.values()))
+    by_errors = input_doubt(as_read, expected, simulation, values, errors, made.smoothers)
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
     expected = expected.with_notes(*notes_on_errors(shown, simulation.sensors, as_read, simulation.channel))
@@ -157,7 +160,8 @@ def inputs_of(
     expected = expected.with_notes(*in_units)
     carries = _carries_over_gaps(as_read, simulation, values, predicted)
     in_gaps = inputs_otherwise_in_gaps(expected, simulation.inputs) if carries else None
-    return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within, in_gaps)
+    doubt = total_doubt((by_errors, *(each.doubt for each in between.values())))
+    return Inputs(as_read, expected, otherwise, blanks, undefined, doubt, within, in_gaps)
 
 
 def _carries_over_gaps(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +24,8 @@ from regolithd.calibration.mismatch.signal.stein import (
 from regolithd.calibration.mismatch.signal.wiener_filter import best_filter, even_pieces
 
 Array = NDArray[np.float64]
+Smoother = Callable[[Array], Array]
+"""From readings (time,) to the estimate of the truth, by a model that stays as it is."""
 
 MOST_FITTED = 16
 """Windows (of 256 instants each) in which the models are fitted and compared: longer recordings cost no more."""
@@ -46,7 +49,8 @@ LEAST_IN_MOTION = 0.1
 """Standard deviations of the readings' error that a column has at least in the direction of its motion, between a rest
 and the first clear reading (a choice: of a sign, not of a size)."""
 FEWEST_AT_REST = 9
-"""Readings one after the other that must be so (a choice): fewer are passed on the way from one sign to the other."""
+"""Readings one after the other that must be so (a choice): fewer are passed on the way from one sign to the other, or
+from a rest to a clear motion."""
 LEAST_POSTERIOR = 1e-6
 """A posterior's variance in error variances is at least this, that of a million readings: less is rounding."""
 
@@ -59,6 +63,7 @@ class NormalTruth:
     ----------
     mean, variance: given all readings, shape (time,)
     prior_mean, prior_variance, persistence: of the model
+    again: the mean given other readings
     """
 
     mean: Array
@@ -66,6 +71,7 @@ class NormalTruth:
     prior_mean: float
     prior_variance: float
     persistence: float
+    again: Smoother = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,14 +119,17 @@ def smooth_where_better(column: NoisyColumn, normal: NormalTruth) -> NormalTruth
     read = centred[rows][known[rows]]
     if not (clearly_better(read, deviation**2, new, old, 2) and consistent(read, deviation**2, new)):
         return normal
-    smooth = spline.mean(centred, deviation, differences(column.time, column.run, spline.order))
-    if not consistent_throughout(centred[known], deviation**2, smooth[known]):
+    everywhere = differences(column.time, column.run, spline.order)
+
+    def again(readings: Array) -> Array:
+        return spline.mean(readings - normal.prior_mean, deviation, everywhere) + normal.prior_mean
+
+    smooth = again(column.readings)
+    if not consistent_throughout(column.readings[known], deviation**2, smooth[known]):
         return normal
-    smooth += normal.prior_mean
     variance = max(float(new.variance.mean()), LEAST_LEFT * deviation**2)
-    return replace(
-        normal, mean=np.where(np.isfinite(normal.mean), smooth, np.nan), variance=np.full(smooth.shape, variance)
-    )
+    mean = np.where(np.isfinite(normal.mean), smooth, np.nan)
+    return replace(normal, mean=mean, variance=np.full(smooth.shape, variance), again=again)
 
 
 def filtered_where_better(column: NoisyColumn, before: NormalTruth) -> NormalTruth:
@@ -155,7 +164,13 @@ def filtered_where_better(column: NoisyColumn, before: NormalTruth) -> NormalTru
     if not consistent_throughout(column.readings[known], variance, mean[known]):
         return before
     left = np.maximum(everywhere.variance, LEAST_LEFT * variance)
-    return replace(before, mean=mean, variance=np.where(told, left, before.variance))
+
+    def again(readings: Array) -> Array:
+        pieces = even_pieces(readings, column.time, column.run)
+        filtered = found.applied(readings - before.prior_mean, pieces, variance).mean + before.prior_mean
+        return np.where(np.isfinite(filtered), filtered, before.again(readings))
+
+    return replace(before, mean=mean, variance=np.where(told, left, before.variance), again=again)
 
 
 def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> NormalTruth:
@@ -181,16 +196,17 @@ def direction_beside_rest(mean: Array, deviation: float, rest: NDArray[np.bool_]
     """Return the sign of a motion from a rest to its first clear estimate, and from the last to a rest; 0 elsewhere.
 
     A motion that begins or ends where readings are exactly 0 has one direction there, whatever the noise of its first
-    and last readings: friction of the other one would be as large as that of the whole motion.
+    and last readings: friction of the other one would be as large as that of the whole motion. What is within the noise
+    for longer may be a creep of the other direction.
     """
     found = np.zeros(len(mean))
     edges = np.flatnonzero(np.diff(rest, prepend=True, append=True))
     for first, last in edges.reshape(-1, 2).tolist():
         clear = first + np.flatnonzero(np.abs(mean[first:last]) > REST_DEVIATIONS * deviation)
         if clear.size and first:
-            found[first : clear[0]] = np.sign(mean[clear[0]])
+            found[max(first, clear[0] - FEWEST_AT_REST) : clear[0]] = np.sign(mean[clear[0]])
         if clear.size and last < len(mean):
-            found[clear[-1] + 1 : last] = np.sign(mean[clear[-1]])
+            found[clear[-1] + 1 : min(last, clear[-1] + 1 + FEWEST_AT_REST)] = np.sign(mean[clear[-1]])
     return found
 
 

@@ -88,7 +88,7 @@ def _by_doubt(design: DesignMatrix, left: Array) -> tuple[Single, Single]:
     alone, together = (design.in_folds(values) for values in (doubt.alone, doubt.together))
     places = [places for places, _ in design.readings]
     squares, known = ([values[wheel, at] for wheel, at in enumerate(places)] for values in (left**2, alone))
-    constant, share = variance_components(squares, known)
+    constant, share = variance_components(squares, known, doubt.most)
     for wheel, (at, level) in enumerate(zip(places, constant, strict=True)):
         if level > 0:
             each[wheel, at] = np.sqrt(level / (level + share * alone[wheel, at]))

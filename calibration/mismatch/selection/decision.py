@@ -213,7 +213,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     left = noise_left(with_sines(equations))
     equations = whitened(equations, left)
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
-    equations = with_proposed_shapes(equations, candidates)
+    equations = with_proposed_shapes(equations, candidates, left)
     equations, subsets = best_subsets(equations)
     equations, terms = with_best_developments(equations, _largest_that_passes(equations, subsets, threshold).terms)
     named = equations.fit(terms)
@@ -307,14 +307,19 @@ def with_sines(equations: NormalEquations) -> NormalEquations:
     return equations.over(with_periodic_terms(equations.design, residual_of(equations, equations.fit(()))))
 
 
-def with_proposed_shapes(equations: NormalEquations, candidates: Sequence[Candidate]) -> NormalEquations:
-    """Return equations with the shapes and the sines over time that the residual of the free parameters suggests."""
+def with_proposed_shapes(equations: NormalEquations, candidates: Sequence[Candidate], left: Array) -> NormalEquations:
+    """Return equations with the shapes and the sines over time that the residual of the free parameters suggests.
+
+    And with those shapes that stand out of what is `left` (time, wheel) beside all that is significant, and that larger
+    effects hide.
+    """
     problem = equations.problem
     residual = residual_of(equations, equations.fit(()))
     design, white = equations.design, equations.design.whitened_in_time(residual)
     autocorrelation_time = _autocorrelation_time(equations, white)
     for candidate in candidates:
-        if shapes := candidate.propose_shapes(problem, residual):
+        shapes = [shape for each in (residual, left) for shape in candidate.propose_shapes(problem, each)]
+        if shapes := [shape for place, shape in enumerate(shapes) if shape not in shapes[:place]]:
             reductions = [
                 max(autocorrelation_time / candidate.autocorrelation_time_at(problem, white, shape), 1.0)
                 for shape in shapes

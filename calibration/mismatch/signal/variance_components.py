@@ -18,11 +18,13 @@ LEAST_CONSTANT = 0.1
 """Share of a course's mean square that is constant noise at least (a choice: no reading knows everything)."""
 
 
-def variance_components(squares: Sequence[Array], known: Sequence[Array]) -> tuple[list[float], float]:
+def variance_components(
+    squares: Sequence[Array], known: Sequence[Array], most: float = 1.0
+) -> tuple[list[float], float]:
     """Return the constant variance of each course of readings, and the share κ of what is known to disturb them.
 
     A reading's square has the mean σ² + κ s², with s² from `known`, shape (reading,) as `squares`. Every course has a
-    σ² of its own; κ, from 0 to 1, is common: it is less than 1 where the disturbance is less than was stated. By
+    σ² of its own; κ, from 0 to `most`, is common: it is less than 1 where the disturbance is less than was stated. By
     regression of the squares, each with its own variance (iteratively reweighted).
     """
     least = [LEAST_CONSTANT * float(np.mean(each)) if each.size else 0.0 for each in squares]
@@ -34,7 +36,7 @@ def variance_components(squares: Sequence[Array], known: Sequence[Array]) -> tup
         away = [doubt - _mean(doubt, weight) for doubt, weight in zip(known, weights, strict=True)]
         moment = sum(float(np.sum(w * far * square)) for w, far, square in zip(weights, away, squares, strict=True))
         energy = sum(float(np.sum(w * far**2)) for w, far in zip(weights, away, strict=True))
-        before, share = share, float(np.clip(moment / energy, 0.0, 1.0)) if energy > 0 else 0.0
+        before, share = share, float(np.clip(moment / energy, 0.0, most)) if energy > 0 else 0.0
         constant = [
             max(_mean(square - share * doubt, weight), floor)
             for square, doubt, weight, floor in zip(squares, known, weights, least, strict=True)

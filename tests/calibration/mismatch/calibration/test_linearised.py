@@ -143,3 +143,38 @@ def test_a_step_is_bent_by_what_noise_lets_pass_not_by_what_is_left_out() -> Non
     assert Step(problem, {"head_m": 2.5}).is_bent()
     assert not Step(off, {"head_m": 2.5}).is_bent()
     assert Step(off, {"head_m": 2.5}, beside).is_bent()
+
+
+class Geared(Simulation):
+    """The current of a motor by its torque constant, and by a friction of its own."""
+
+    channel, unit = "current_A", "A"
+    inputs = ("torque_Nm",)
+    parameters: ClassVar = {"constant_Nm_A": Prior(0.4, 0.008, "N·m/A"), "idle_A": Prior(0.5, 0.01, "A")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the current."""
+        return inputs["torque_Nm"] / values["constant_Nm_A"] + values["idle_A"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the torque."""
+        return {"load": inputs["torque_Nm"]}
+
+
+@pytest.mark.parametrize(("constant", "value"), [(0.55, 0.55), (0.8, None)])
+def test_a_value_that_the_simulation_does_not_go_along_with_is_none(constant: float, value: float | None) -> None:
+    """A torque constant that is a third larger than stated is told, and not a fit's promise of one twice as large."""
+    answer = compare(geared(constant, 0.5), Geared()).answer
+    moved = [each.value for each in answer.parameters if each.prior_stds_away > 3]
+    assert moved == ([] if value is None else [pytest.approx(value, rel=0.01)])
+    assert answer.verdict == ("unexplained" if value is None else "missing-physics")
+
+
+def geared(constant: float, idle: float) -> Recording:
+    """Return the current of a motor with this torque constant [N·m/A] and idle current [A]."""
+    random = np.random.default_rng(5)
+    torque = np.repeat(random.uniform(1, 9, 200), 10)
+    noise = random.normal(0, 0.05, len(torque))
+    return from_columns(
+        {"t_s": np.arange(2000) * 0.1, "torque_Nm": torque, "current_A": torque / constant + idle + noise}
+    )

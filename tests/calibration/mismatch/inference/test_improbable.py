@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.inference import improbable
 from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
 from regolithd.calibration.mismatch.inference.improbable import (
     in_probable_regions,
+    over_time_if_improbable,
     unexplained_if_improbable,
     without_improbable_curves,
 )
@@ -126,3 +127,17 @@ def test_spells_that_an_improbable_curve_stood_for_are_unexplained(monkeypatch: 
     found = without_improbable_curves(replace(decision, unnamed=(curve,), whole=equations.fit((curve,))))
     assert [(term.name, term.wheels) for term in found.unnamed] == [("time", (0,))]
     assert len(found.intermittent) == 1
+
+
+def test_what_another_covariate_does_not_hold_is_left_over_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A curve that held-out readings refuted is not refused twice: what has most evidence beside it is there."""
+    decision = without_names(decided(np.where(np.arange(INSTANTS) > INSTANTS // 2, 0.3, 0.0)[:, None]))
+    refuted = replace(decision, refused=frozenset({frozenset({"unexplained"})}))
+    ahead = Alternative(("drag", "unexplained"), -20.0)
+    monkeypatch.setattr(improbable, "alternatives", lambda _, refused: (ahead,) if refused else ())
+    (curve,) = over_time_if_improbable(refuted).unnamed
+    assert curve.name == "time"
+    assert over_time_if_improbable(decision) is decision  # nothing was refuted
+    same = replace(ahead, effects=("unexplained",))
+    monkeypatch.setattr(improbable, "alternatives", lambda _, refused: (same,) if refused else ())
+    assert over_time_if_improbable(refuted) is refuted  # that is what was refuted

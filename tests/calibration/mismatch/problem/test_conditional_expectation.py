@@ -7,12 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.data.recording import Recording
-from regolithd.calibration.mismatch.problem.errors_in_variables import (
-    _autoregression,
-    conditional_expectation,
-    expected_inputs,
-    known_mean,
-)
+from regolithd.calibration.mismatch.problem.autoregressive_truths import _autoregression, normal_truths
+from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs, known_mean
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 
@@ -45,7 +41,7 @@ def test_the_smoother_is_the_conditional_expectation(starts: list[int]) -> None:
     expected = [
         by_matrices(values[:, k], float(persistence[k]), float(variance[k]), float(error[k]), starts) for k in range(3)
     ]
-    np.testing.assert_allclose(conditional_expectation(values, error, np.array(starts)), np.transpose(expected))
+    np.testing.assert_allclose(normal_truths(values, error, np.array(starts)).mean, np.transpose(expected))
 
 
 def test_persistence_and_variance_of_a_known_process() -> None:
@@ -100,7 +96,7 @@ def test_an_input_is_replaced_where_it_has_an_error() -> None:
     scales = [ReadingScale.of(column, SensorError(relative=0.05)) for column in load.T]
     stabilised = np.stack([scale.stabilised(column) for scale, column in zip(scales, load.T, strict=True)], axis=1)
     variances = np.array([*(scale.deviation for scale in scales), 0.01, 0.01]) ** 2
-    expected = conditional_expectation(np.hstack((stabilised, slip)), variances, np.array([0, 20]))
+    expected = normal_truths(np.hstack((stabilised, slip)), variances, np.array([0, 20])).mean
     for column, scale in enumerate(scales):
         np.testing.assert_allclose(found.channels["load"][:, column], scale.readings(expected[:, column]))
     np.testing.assert_allclose(found.channels["slip"], expected[:, 2:])

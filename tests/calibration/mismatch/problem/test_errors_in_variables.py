@@ -6,7 +6,8 @@ import numpy as np
 
 from regolithd.calibration.mismatch import SensorError
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation, expected_inputs
+from regolithd.calibration.mismatch.problem.autoregressive_truths import normal_truths
+from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 
 START = np.array([0])
 
@@ -16,7 +17,7 @@ def test_a_slow_signal_is_cleaned_and_its_slope_is_not_attenuated() -> None:
     rng = np.random.default_rng(1)
     truth = np.sin(np.arange(6000) / 200)[:, None]
     noisy = truth + rng.normal(0, 0.3, truth.shape)
-    estimate = conditional_expectation(noisy, np.array([0.09]), START)
+    estimate = normal_truths(noisy, np.array([0.09]), START).mean
     assert np.std(estimate - truth) < 0.35 * 0.3
     slope = float(np.sum(truth * estimate) / np.sum(estimate**2))
     assert abs(slope - 1) < 0.01
@@ -26,14 +27,14 @@ def test_a_slow_signal_is_cleaned_and_its_slope_is_not_attenuated() -> None:
 def test_without_a_stated_error_nothing_is_touched() -> None:
     """A reading that is exact is the truth."""
     values = np.random.default_rng(2).normal(0, 1, (500, 2)).cumsum(axis=0)
-    np.testing.assert_allclose(conditional_expectation(values, np.zeros(2), START), values, atol=1e-6)
+    np.testing.assert_allclose(normal_truths(values, np.zeros(2), START).mean, values, atol=1e-6)
 
 
 def test_what_is_unknown_stays_unknown_and_does_not_spread() -> None:
     """NaN stays where it was."""
     values = np.random.default_rng(3).normal(0, 1, (500, 1)).cumsum(axis=0)
     values[100:200] = np.nan
-    estimate = conditional_expectation(values, np.array([0.01]), START)
+    estimate = normal_truths(values, np.array([0.01]), START).mean
     np.testing.assert_array_equal(np.isnan(estimate), np.isnan(values))
 
 

@@ -81,3 +81,37 @@ def test_an_input_that_should_do_less_is_no_other_unit() -> None:
 def test_what_is_left_out_is_no_other_unit(left_out: float) -> None:
     """However large it is."""
     assert notes_of(columns(left_out)) == []
+
+
+class Hoisting(Climbing):
+    """A current that holds a load by its weight."""
+
+    inputs = ("load_kg",)
+    parameters: ClassVar = {"constant_A_N": Prior(0.02, 0.001, "A/N")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the current."""
+        return values["constant_A_N"] * 9.81 * inputs["load_kg"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the load."""
+        return {"load": inputs["load_kg"]}
+
+
+def test_a_mass_that_is_recorded_as_a_weight_is_an_error() -> None:
+    """No parameter is ten times as large as stated."""
+    load = 30 + 10 * np.sin(np.arange(ROWS) / 100)
+    recording = {"t_s": np.arange(ROWS) * 0.1, "motor_A": 0.02 * 9.81 * load, "load_kg": 9.81 * load}
+    with pytest.raises(RecordingError, match="load_kg is likely in N: "):
+        build_problem(from_columns(recording), Hoisting())
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1000.0, "mA"), (1.0, None)])
+def test_a_predicted_column_in_another_unit_is_an_error(factor: float, unit: str | None) -> None:
+    """No physics makes a current a thousand times as large."""
+    table = {**columns(), "motor_A": factor * columns()["motor_A"]}
+    if unit is None:
+        assert not notes_of(table)
+        return
+    with pytest.raises(RecordingError, match=f"motor_A is likely in {unit}: .* Convert the column to A"):
+        build_problem(from_columns(table), Climbing())

@@ -10,11 +10,8 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.problem.errors_in_variables import (
-    conditional_expectation,
-    expected_inputs,
-    normal_truths,
-)
+from regolithd.calibration.mismatch.problem.autoregressive_truths import normal_truths
+from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.true_values import (
     NoisyColumn,
@@ -150,7 +147,7 @@ def test_unknown_readings_stay_unknown_and_exact_zeros_stay_zero() -> None:
     columns = {"t_s": np.arange(COUNT) / 50, "acceleration": readings, "other": np.ones(COUNT)}
     found = expected_inputs(from_columns(columns), {"acceleration": SensorError(absolute=0.1)})
     estimate = found.channels["acceleration"][:, 0]
-    normal = conditional_expectation(readings[:, None], np.array([0.01]), START)[:, 0]
+    normal = normal_truths(readings[:, None], np.array([0.01]), START).mean[:, 0]
     np.testing.assert_array_equal(np.isnan(estimate), np.isnan(readings))
     assert not estimate[2000:2500].any()
     told = np.isfinite(readings) & (readings != 0)
