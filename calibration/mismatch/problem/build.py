@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
-from regolithd.calibration.mismatch.problem.input_doubt import bias_of
+from regolithd.calibration.mismatch.problem.input_doubt import bias_of, without_error_of_derivatives
 from regolithd.calibration.mismatch.problem.outliers import FaultyReadings, note_on_far_readings
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
@@ -74,7 +74,7 @@ def build_problem(
         prepared,
         simulation,
         complete_inputs(prepared),
-        prediction,
+        without_error_of_derivatives(prediction, inputs.doubt, prepared),
         as_read,
         arbitrary_zero=zero_is_arbitrary(simulation, measured),
     )

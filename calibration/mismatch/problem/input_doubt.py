@@ -25,6 +25,7 @@ from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.problem.true_values import direction_beside_rest
 from regolithd.calibration.mismatch.problem.unknown_directions import UnknownDirections
+from regolithd.calibration.mismatch.signal.means import local_means
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -51,7 +52,7 @@ differentiates an input whose errors are independent (a choice: a central differ
 FURTHEST = 16
 """Readings over which a simulation differentiates at most (a choice)."""
 AVERAGED = 15
-"""Readings over which the squares of such errors are averaged (a choice: a few times as long as they last)."""
+"""Readings over which such errors, and their squares, are averaged (a choice: a few times as long as they last)."""
 MOST_OF_DRAWN = 4.0
 """Times as much as drawn that their variance may be (a choice: where the truth changes most, a smoother that suits the
 whole recording leaves up to twice the error)."""
@@ -81,6 +82,11 @@ class InputDoubt:
     bias: Array
     draws: Array
     most: float = 1.0
+
+    @property
+    def of_derivative(self) -> bool:
+        """Whether the simulation differentiates an input that has errors."""
+        return self.most > 1
 
 
 def input_doubt(
@@ -120,7 +126,8 @@ def input_doubt(
         one, other = (asked.change(name, inputs[name] + sign * lot) for sign in (1.0, -1.0))
         in_common = wheels_in_common(inputs[name])
         if smoothers and name in smoothers and _differentiated(one - other):
-            variance = _averaged(asked.variance(name, _drawn(inputs[name], error, smoothers[name])), starts)
+            drawn = asked.variance(name, _drawn(inputs[name], error, smoothers[name]))
+            variance = np.maximum(local_means(drawn, drawn > 0, starts, AVERAGED), 0.0)
             doubts.append(InputDoubt(variance, in_common * variance, (one + other) / 2, asked.none, MOST_OF_DRAWN))
         else:
             variance = (one**2 + other**2) / 2
@@ -178,19 +185,6 @@ def _drawn(values: Array, error: Array, smoothers: Sequence[Smoother]) -> Iterat
         yield values + np.clip(np.nan_to_num(again - values), -MOST_DRAWN * error, MOST_DRAWN * error)
 
 
-def _averaged(squares: Array, starts: NDArray[np.int64]) -> Array:
-    """Return means of squares (time, wheel) over `AVERAGED` readings, of those that are not 0, each run for itself."""
-    found, half = np.zeros_like(squares), AVERAGED // 2
-    for rows in np.split(np.arange(len(squares)), starts[starts > 0]):
-        here = squares[rows]
-        first = np.maximum(np.arange(len(rows)) - half, 0)
-        end = np.minimum(np.arange(len(rows)) + half + 1, len(rows))
-        totals = (np.cumsum(np.pad(each, ((1, 0), (0, 0))), axis=0) for each in (here, (here > 0).astype(np.float64)))
-        total, count = (each[end] - each[first] for each in totals)
-        found[rows] = np.where(here > 0, np.maximum(total, 0.0) / np.maximum(count, 1.0), 0.0)
-    return found
-
-
 def _in_motion(values: Array, scale: ReadingScale, starts: NDArray[np.int64]) -> Array:
     """Return the standard deviation of an input's error (time, wheel): 0 at rest, and without a change of sign beside.
 
@@ -231,6 +225,17 @@ def _left_by_smoothing(taken_out: Array, error: Array) -> float:
     """
     uncertain = error > 0
     return float(np.clip(1 - known_mean((taken_out[uncertain] / error[uncertain]) ** 2), LEAST_LEFT, 1.0))
+
+
+def without_error_of_derivatives(prediction: Array, doubt: InputDoubt | None, recording: Recording) -> Array:
+    """Return a prediction (time, wheel) as a covariate: its means, where it has the error of a differentiated input.
+
+    A curve over the prediction itself would follow the error. It swings about 0, and means have hardly any of it.
+    """
+    if doubt is None or not doubt.of_derivative:
+        return prediction
+    moving = np.isfinite(prediction) & (prediction != 0)
+    return local_means(prediction, moving, run_starts(recording), AVERAGED)
 
 
 def wheels_in_common(values: Array) -> int:

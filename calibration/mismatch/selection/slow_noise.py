@@ -6,6 +6,7 @@ it gains by the weights what it does not gain in likelihood: a slow spectrum exp
 
 from __future__ import annotations
 
+from itertools import islice
 from math import inf, log
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+RIVALS = 3
+"""Curves over other covariates that are asked in noise of any spectrum, best first (a choice)."""
 FEWEST_KNOTS = 4
 """Knots from which a curve has a course that may be smooth (a choice)."""
 
@@ -118,7 +121,9 @@ def _over_another_covariate(
 
     A curve over time has knots enough to follow whatever changes slowly. By Schwarz's criterion each of them costs the
     logarithm of the number of readings. Of what the other curve explains, the share that an inexact law may lack
-    (`form_misfit`) is no objection: its knots are few. Noise of any spectrum does not explain it either.
+    (`form_misfit`) is no objection: its knots are few. Noise of any spectrum does not explain it either. What slow
+    noise explains of the curve over time is no evidence for the time: one of the next curves that is clearly ahead in
+    noise of any spectrum, by as much as a curve must score, is told whatever it lacks.
     """
     limits, (score, curve) = equations.thresholds, best
     if curve.name != "time":
@@ -137,5 +142,14 @@ def _over_another_covariate(
         and each >= (1 - limits.form_misfit) * score
     ]
     most, other = max(rivals, key=lambda pair: pair[0], default=(-inf, curve))
-    ahead = most > evidence(score, curve)
-    return other if ahead and score_beside_slow_noise(equations, given, [other]) > limits.slow_noise_entry else curve
+    if most > evidence(score, curve) and score_beside_slow_noise(equations, given, [other]) > limits.slow_noise_entry:
+        return other
+    alike = (
+        term
+        for each, term in curves
+        if term.wheels == curve.wheels and term.name != "time" and each > limits.smooth_term_entry
+    )
+    in_slow_noise = [(score_beside_slow_noise(equations, given, [term]), term) for term in islice(alike, RIVALS)]
+    most, other = max(in_slow_noise, key=lambda pair: pair[0], default=(-inf, curve))
+    least = score_beside_slow_noise(equations, given, [curve]) + limits.smooth_term_entry
+    return other if most > least else curve

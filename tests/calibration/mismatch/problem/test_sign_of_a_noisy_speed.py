@@ -72,9 +72,9 @@ def driven(seed: int, *, friction_A: float = FRICTION_A, until_start: bool = Fal
 
 
 def test_nothing_is_found_where_nothing_is_missing() -> None:
-    """In ten of twelve: what smoothing leaves of a speed's error is slow in its rate, and as large as the noise."""
+    """In eleven of twelve: what smoothing leaves of a speed's error is slow in its rate, and as large as the noise."""
     answers = [compare(driven(seed)[0], Cart()).answer for seed in range(12)]
-    assert sum(answer.verdict == "consistent" for answer in answers) >= 10
+    assert sum(answer.verdict == "consistent" for answer in answers) >= 11
     assert all(each.prior_stds_away < 3 for answer in answers for each in answer.parameters)
     assert not any(answer.effects for answer in answers)
 
@@ -86,7 +86,7 @@ def test_a_recording_may_end_as_a_motion_begins(seed: int) -> None:
     assert answer.verdict == "consistent", answer.unexplained
 
 
-@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_friction_has_its_size(seed: int) -> None:
     """A quarter more than is stated, in the place of a parameter."""
     answer = compare(driven(seed, friction_A=1.25 * FRICTION_A)[0], Cart()).answer
