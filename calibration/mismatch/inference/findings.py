@@ -27,6 +27,7 @@ from regolithd.calibration.mismatch.inference.intervals import (
     parameters_of,
     size_posteriors_of,
 )
+from regolithd.calibration.mismatch.inference.joint_parameters import information_of, joint_posterior
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
 from regolithd.calibration.mismatch.inference.other_covariates import (
@@ -46,6 +47,7 @@ from regolithd.calibration.mismatch.inference.same_parameters import with_change
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
+from regolithd.calibration.mismatch.regression.lasting_errors import has_lasting_errors
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
@@ -100,7 +102,8 @@ def findings_of(
     effects, changes = named_effects(decision, held_out, drawn)
     covariance = parameter_covariance(decision, drawn)
     of_wheels = own_values(decision, covariance)
-    parameters = (*calibrated_parameters(decision, covariance), *far_enough(decision, of_wheels))
+    calibrated = _beside_lasting_errors(decision, drawn, calibrated_parameters(decision, covariance))
+    parameters = (*calibrated, *far_enough(decision, of_wheels))
     limits, places = decision.equations.thresholds, unexplained(decision)
     rest = bool(decision.unnamed)
     moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
@@ -217,6 +220,24 @@ def calibrated_parameters(decision: Decision, covariance: Array) -> tuple[Calibr
         low, high = value - NINETY_PERCENT_STDS * std, value + NINETY_PERCENT_STDS * std
         found.append(CalibratedParameter(name, prior.unit, prior.value, prior.std, value, low, high))
     return tuple(found)
+
+
+def _beside_lasting_errors(
+    decision: Decision, drawn: Drawn | None, parameters: tuple[CalibratedParameter, ...]
+) -> tuple[CalibratedParameter, ...]:
+    """Return parameters as they are; where those that left their priors may have, by errors of inputs that last, held.
+
+    A fit's weights do not know what these errors did to it; its covariance, and what the readings know, do.
+    """
+    limits, priors = decision.equations.thresholds, decision.equations.problem.simulation.parameters
+    beyond = [each for each in parameters if each.beyond_prior(limits)]
+    if not beyond or not has_lasting_errors(decision.equations.problem):
+        return parameters
+    stds = [np.hypot(each.prior_std, (each.high - each.low) / 2 / NINETY_PERCENT_STDS) for each in beyond]
+    away = [abs(each.value - each.prior) for each in beyond]
+    if any(far > limits.furthest_prior_stds * std for far, std in zip(away, stds, strict=True)):
+        return parameters
+    return joint_posterior(priors, [information_of(decision, drawn)]).parameters(priors)
 
 
 def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], errors: tuple[float, float]) -> Effect:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.errors_in_variables import at_rest, expected_inputs
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.signal.first_order import FirstOrder
@@ -89,11 +89,14 @@ def _by_scatter(readings: Array, time: Array, run: NDArray[np.int64], stated: Se
 def scatter(values: Array, time: Array, run: NDArray[np.int64]) -> float:
     """Return the standard deviation of white noise in readings (time, wheel), by differences within a run.
 
-    Their median does not see steps. What the column itself does adds to them, the less the higher their order is, and
+    Readings that stay at exactly 0 have no error: the sun at night, an axis at rest. The median of the others'
+    differences does not see steps. What the column itself does adds to them, the less the higher their order is, and
     noise adds the same to each: the least counts. 0 where more than half of them are 0: a column that is set, or
     rounded. A course that goes to and fro within a few readings adds to all orders; noise is then what is left of
     whole windows (`noise_floor`).
     """
+    starts = np.flatnonzero(np.diff(run, prepend=run[:1] - 1))
+    values = np.where(at_rest(values, starts), np.nan, values)
     found = []
     for order in ORDERS[: max(len(run) - 1, 0)]:
         same = (run[order:] == run[: len(run) - order])[:, None]

@@ -49,8 +49,7 @@ LEAST_IN_MOTION = 0.1
 """Standard deviations of the readings' error that a column has at least in the direction of its motion, between a rest
 and the first clear reading (a choice: of a sign, not of a size)."""
 FEWEST_AT_REST = 9
-"""Readings one after the other that must be so (a choice): fewer are passed on the way from one sign to the other, or
-from a rest to a clear motion."""
+"""Readings one after the other that must be so (a choice): fewer are passed on the way from one sign to the other."""
 LEAST_POSTERIOR = 1e-6
 """A posterior's variance in error variances is at least this, that of a million readings: less is rounding."""
 
@@ -192,21 +191,21 @@ def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> Nor
     return replace(smooth, mean=mean)
 
 
-def direction_beside_rest(mean: Array, deviation: float, rest: NDArray[np.bool_]) -> Array:
+def direction_beside_rest(mean: Array, deviation: float, rest: NDArray[np.bool_], longest: int | None = None) -> Array:
     """Return the sign of a motion from a rest to its first clear estimate, and from the last to a rest; 0 elsewhere.
 
     A motion that begins or ends where readings are exactly 0 has one direction there, whatever the noise of its first
-    and last readings: friction of the other one would be as large as that of the whole motion. What is within the noise
-    for longer may be a creep of the other direction.
+    and last readings: friction of the other one would be as large as that of the whole motion. `longest` is how many
+    readings from a clear one on have its direction at most; None: all.
     """
-    found = np.zeros(len(mean))
+    found, most = np.zeros(len(mean)), len(mean) if longest is None else longest
     edges = np.flatnonzero(np.diff(rest, prepend=True, append=True))
     for first, last in edges.reshape(-1, 2).tolist():
         clear = first + np.flatnonzero(np.abs(mean[first:last]) > REST_DEVIATIONS * deviation)
         if clear.size and first:
-            found[max(first, clear[0] - FEWEST_AT_REST) : clear[0]] = np.sign(mean[clear[0]])
+            found[max(first, clear[0] - most) : clear[0]] = np.sign(mean[clear[0]])
         if clear.size and last < len(mean):
-            found[clear[-1] + 1 : min(last, clear[-1] + 1 + FEWEST_AT_REST)] = np.sign(mean[clear[-1]])
+            found[clear[-1] + 1 : min(last, clear[-1] + 1 + most)] = np.sign(mean[clear[-1]])
     return found
 
 

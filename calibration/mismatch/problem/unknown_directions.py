@@ -26,6 +26,9 @@ LEAST_WRONG = 0.001
 """Probability of the other sign below which it is known (a choice)."""
 BESIDE_ZERO = 0.01
 """Deviations of an error from 0 at which the prediction is asked for its step (a choice: nothing else changes)."""
+LONGEST_START = 10
+"""Readings from a rest to a clear motion at most that surely have its direction (a choice: a motion that takes longer
+may have crept the other way first)."""
 AT_AN_EDGE = 2
 """Readings at the ends of what seems to rest that may be in motion already, or still (a choice: a start or a stop
 within the error of 0 takes about as many)."""
@@ -59,7 +62,7 @@ class UnknownDirections:
         wrong = np.where(values == 0, 0.0, ndtr(-np.abs(np.nan_to_num(values, nan=np.inf)) / deviation))
         rest, readings, moving = at_rest(read, starts), np.zeros(values.shape), np.zeros(values.shape)
         for k, column in enumerate(values.T):
-            known = rest[:, k] | (direction_beside_rest(column, scale.absolute, rest[:, k]) != 0)
+            known = rest[:, k] | (direction_beside_rest(column, scale.absolute, rest[:, k], LONGEST_START) != 0)
             wrong[known | (wrong[:, k] < LEAST_WRONG), k] = 0.0
             for first, end in stretches(wrong[:, k] > 0):
                 readings[first:end, k] = min(end - first, FEWEST_AT_REST)

@@ -45,6 +45,9 @@ KINDS = ("all", "some", "one")
 """Of sets of wheels that may share an effect."""
 SINGULAR = 1e-10
 """Relative eigenvalue below which a direction of the normal equations counts as undetermined: rounding of float32."""
+BY_ERRORS = 4.0
+"""Times what the inputs' errors give a term on average that it has to gain (a choice: they have few directions of much
+power, and of one alone four times the mean is exceeded in one of twenty)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +191,22 @@ class NormalEquations:
         on = membership(columns, len(self.weights))[:, :, None]
         read = self.design.in_time(self.design.columns_as_read([column for column, _ in columns]) * on)
         return moments_of_errors(self.design, self.weights, self.design.whitened_in_time(read))
+
+    def needed_beside_errors(self, given: Iterable[Term], term: Term) -> float:
+        """Return the Δχ² that a term has to gain beside others beyond what inputs' errors that last give it.
+
+        These give it the mean of mᵀ S⁻¹ m over draws of them, with m the moments of its columns and S their Schur
+        complement: right on average, however few the draws are. 0 where no errors last.
+        """
+        if not has_lasting_errors(self.problem):
+            return 0.0
+        columns = self.columns_of((*given, term))
+        size, errors = len(columns) - len(term.group.columns), self.moments_of_errors(columns)
+        matrix, _ = self._normal(columns)
+        inverse, cross = pseudo_inverse(matrix[:size, :size], SINGULAR), matrix[:size, size:]
+        complement = schur_complement(matrix[size:, size:], cross, inverse)
+        beside = errors[:, size:] - errors[:, :size] @ inverse @ cross
+        return BY_ERRORS * float(np.sum(pseudo_inverse(complement, SINGULAR) * covariance_of_scores(beside)))
 
     def penalty(self, term: Term) -> float:
         """Return what a term has to gain beyond chance, in Δχ²."""

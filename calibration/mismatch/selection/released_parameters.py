@@ -129,10 +129,12 @@ def _acts_as(equations: NormalEquations, named: Fit, index: int, place: int) -> 
 
     Not one of which the simulation says that it is something else (`parameter_effects`): soil, not friction.
     """
-    problem, parameter = equations.problem, equations.nuisance.names[place]
+    problem, name = equations.problem, equations.nuisance.names[place]
+    parameter, wheel = equations.nuisance.own.get(name, (name, None))
     if problem.simulation.parameter_effects.get(parameter, named.terms[index].name) != named.terms[index].name:
         return False
-    change = np.where(problem.mask, problem.tangent(parameter), 0.0)
+    changed = problem.mask if wheel is None else problem.mask & (np.array(problem.recording.wheels) == wheel)
+    change = np.where(changed, problem.tangent(parameter), 0.0)
     effect = np.where(problem.mask, contribution(equations, named, index), 0.0)
     return same_action(change, effect)
 
@@ -150,7 +152,7 @@ def _releases(
     for removed in (None, *range(len(named.terms))):
         kept = named.terms if removed is None else named.without(removed)
         fit = equations.fit(kept)
-        own = nuisance.contradicting_deviations(fit, problem) if removed is None else []
+        own = nuisance.contradicting_deviations(fit, problem)
         contradicted = (*nuisance.contradicting_their_priors(fit, problem).tolist(), *own)
         if not contradicted:
             continue

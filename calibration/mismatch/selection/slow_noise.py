@@ -96,7 +96,9 @@ def apart(one: Sequence[Term], other: Sequence[Term]) -> tuple[tuple[Term, ...],
 
 
 def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Sequence[tuple[float, Term]]) -> Term | None:
-    """Return the significant curve that scores most of those that noise of any spectrum does not explain, if any.
+    """Return the significant curve that scores most of those that slow noise and the inputs' errors do not explain.
+
+    None, if there is none.
 
     In place of one over time, it is one over another covariate that is more probable (`_over_another_covariate`).
 
@@ -109,6 +111,8 @@ def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Sequen
     for score, curve in curves:
         if score <= limits.smooth_term_entry:
             break
+        if score <= limits.smooth_term_entry + equations.needed_beside_errors(given, curve):
+            continue
         if score_beside_slow_noise(equations, given, [curve]) > limits.slow_noise_entry:
             return _over_another_covariate(equations, given, (score, curve), curves)
     return None
@@ -122,8 +126,8 @@ def _over_another_covariate(
     A curve over time has knots enough to follow whatever changes slowly. By Schwarz's criterion each of them costs the
     logarithm of the number of readings. Of what the other curve explains, the share that an inexact law may lack
     (`form_misfit`) is no objection: its knots are few. Noise of any spectrum does not explain it either. What slow
-    noise explains of the curve over time is no evidence for the time: one of the next curves that is clearly ahead in
-    noise of any spectrum, by as much as a curve must score, is told whatever it lacks.
+    noise explains of the curve over time is no evidence for the time: one of the next such curves that is clearly ahead
+    in noise of any spectrum, by as much as a curve must score, is told whatever its knots cost.
     """
     limits, (score, curve) = equations.thresholds, best
     if curve.name != "time":
@@ -147,7 +151,7 @@ def _over_another_covariate(
     alike = (
         term
         for each, term in curves
-        if term.wheels == curve.wheels and term.name != "time" and each > limits.smooth_term_entry
+        if term.wheels == curve.wheels and term.name != "time" and each >= (1 - limits.form_misfit) * score
     )
     in_slow_noise = [(score_beside_slow_noise(equations, given, [term]), term) for term in islice(alike, RIVALS)]
     most, other = max(in_slow_noise, key=lambda pair: pair[0], default=(-inf, curve))

@@ -8,7 +8,12 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.problem.true_values import FEWEST_AT_REST
-from regolithd.calibration.mismatch.problem.unknown_directions import AT_AN_EDGE, UnknownDirections, stretches
+from regolithd.calibration.mismatch.problem.unknown_directions import (
+    AT_AN_EDGE,
+    LONGEST_START,
+    UnknownDirections,
+    stretches,
+)
 
 Array = NDArray[np.float64]
 START, ERROR = np.array([0]), 0.1
@@ -33,12 +38,12 @@ def test_the_probability_is_that_of_the_other_sign() -> None:
 
 def test_a_start_from_rest_has_the_direction_of_its_motion() -> None:
     """For as many readings as a start takes; before them it may have crept the other way."""
-    values = np.concatenate((np.zeros(5), np.full(20, 0.02), np.full(5, 1.0)))
+    values = np.concatenate((np.zeros(5), np.full(30, 0.02), np.full(5, 1.0)))
     found = directions(values)
     assert not found.probability[:5].any()
-    assert found.probability[5 : 25 - FEWEST_AT_REST, 0].min() > 0.3
-    assert not found.probability[25 - FEWEST_AT_REST :].any()
-    assert found.readings[5, 0] == min(20 - FEWEST_AT_REST, FEWEST_AT_REST)
+    assert found.probability[5 : 35 - LONGEST_START, 0].min() > 0.3
+    assert not found.probability[35 - LONGEST_START :].any()
+    assert found.readings[5, 0] == min(30 - LONGEST_START, FEWEST_AT_REST)
 
 
 def test_a_recording_that_ends_as_a_motion_begins_does_not_tell_which_way() -> None:
