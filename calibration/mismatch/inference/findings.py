@@ -102,7 +102,7 @@ def findings_of(
     effects, changes = named_effects(decision, held_out, drawn)
     covariance = parameter_covariance(decision, drawn)
     of_wheels = own_values(decision, covariance)
-    calibrated = _beside_lasting_errors(decision, drawn, calibrated_parameters(decision, covariance))
+    calibrated = beside_lasting_errors(decision, drawn, calibrated_parameters(decision, covariance))
     parameters = (*calibrated, *far_enough(decision, of_wheels))
     limits, places = decision.equations.thresholds, unexplained(decision)
     rest = bool(decision.unnamed)
@@ -222,7 +222,7 @@ def calibrated_parameters(decision: Decision, covariance: Array) -> tuple[Calibr
     return tuple(found)
 
 
-def _beside_lasting_errors(
+def beside_lasting_errors(
     decision: Decision, drawn: Drawn | None, parameters: tuple[CalibratedParameter, ...]
 ) -> tuple[CalibratedParameter, ...]:
     """Return parameters as they are; where those that left their priors may have, by errors of inputs that last, held.

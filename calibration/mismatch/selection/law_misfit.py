@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.problem.covariates import quantity
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
@@ -46,21 +47,24 @@ def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[T
 
     What an inexact law leaves is a share of the law, reading by reading. A delay acts where the prediction changes, and
     explains more than any load there: a term that it hardly follows (a shadow over the sun's azimuth) holds little of
-    what its law misses, however much it explains. What follows the prediction, or is a further delay, holds it all.
+    what its law misses, however much it explains. What follows the prediction, or is a further delay, holds it all. No
+    law of a speed, a load or a temperature misses what repeats with the angle: a ripple holds as little of any.
     """
-    delays = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
+    partly = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
+    if all(term.name == WheelAngleRipple.name for term in further):
+        partly = [index for index, term in enumerate(names.terms) if term.name != WheelAngleRipple.name]
     changed = any(term.group.is_change for term in names.terms)
     follows = any(term.name == SensorDelay.name or is_of_the_prediction(equations.problem, term) for term in further)
-    if not delays or changed or follows:
+    if not partly or changed or follows:
         return explained(equations, names)
-    others = equations.fit([term for term in names.terms if term.name != SensorDelay.name])
-    by_delays = names.delta_chi2 - others.delta_chi2
+    others = equations.fit([term for index, term in enumerate(names.terms) if index not in partly])
+    by_these = names.delta_chi2 - others.delta_chi2
     size = np.zeros(len(names.columns))
-    for index in delays:
+    for index in partly:
         size[names.of_term(index)] = names.coefficients[names.of_term(index)]
     matrix, first = equations.normal_matrix((*names.terms, *further)), len(equations.nuisance.columns)
-    held = min(held_by_last(matrix, first, len(size), size[first:], SINGULAR), by_delays)
-    return explained(equations, names) - by_delays + held
+    held = min(held_by_last(matrix, first, len(size), size[first:], SINGULAR), by_these)
+    return explained(equations, names) - by_these + held
 
 
 def is_of_the_prediction(problem: Problem, term: Term) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import heated_room
@@ -15,7 +16,10 @@ from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.input_doubt import DRAWS, LEAST_LEFT, input_doubt
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.normal_equations import BY_ERRORS
 from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms, whitened
 
 if TYPE_CHECKING:
@@ -252,3 +256,21 @@ def test_a_motion_from_a_rest_is_in_no_doubt_of_its_direction() -> None:
     assert found is not None
     assert not found.alone.any()
     assert not found.bias.any()
+
+
+def test_a_term_has_to_gain_more_than_lasting_errors_give_it() -> None:
+    """What a curve over time gains in the residuals that the errors alone leave, and four times the mean of that."""
+    equations = smooth_equations(build_problem(heated_room.recorded(2), heated_room.ReadRoom()))
+    curves = [term for _, term in best_of_each_smooth_term(equations, ()) if term.name == "time"]
+    needed = equations.needed_beside_errors((), curves[0])
+    doubt = equations.problem.doubt
+    assert doubt is not None
+    gains = []
+    for draw in doubt.draws:
+        problem = replace(equations.problem, measured=equations.problem.prediction + draw)
+        alone = smooth_equations(problem).weighted(equations.weights)
+        (same,) = [term for term in alone.design.groups if term.columns == curves[0].group.columns]
+        gains.append(alone.fit((Term(same, (0,)),)).delta_chi2)
+    assert needed == pytest.approx(BY_ERRORS * float(np.mean(gains)), rel=0.1)
+    static = smooth_equations(build_problem(driven(3), Slipping()))
+    assert static.needed_beside_errors((), best_of_each_smooth_term(static, ())[0][1]) == 0

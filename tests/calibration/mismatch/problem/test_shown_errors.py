@@ -94,3 +94,11 @@ def test_noise_that_nobody_stated_is_no_physics(seed: int) -> None:
     assert found.verdict == "consistent"
     (gain,) = found.parameters
     assert gain.value == pytest.approx(0.051, rel=0.005)
+
+
+def test_readings_that_stay_at_zero_have_no_scatter() -> None:
+    """The sun is 0 for half of the time, without any error; by day its readings scatter as they do."""
+    random, time, run = np.random.default_rng(5), np.arange(COUNT) * 300.0, np.zeros(COUNT, np.int64)
+    sun = np.maximum(800 * np.sin(np.arange(COUNT) * 2 * np.pi / 288), 0.0)[:, None]
+    read = np.where(sun > 0, sun + 10 * random.normal(size=sun.shape), 0.0)
+    assert scatter(read, time, run) == pytest.approx(10, rel=0.15)
