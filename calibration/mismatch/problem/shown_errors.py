@@ -77,7 +77,12 @@ def shown_errors(
 def _by_scatter(readings: Array, time: Array, run: NDArray[np.int64], stated: SensorError) -> SensorError | None:
     """Return the error that readings (time, wheel) scatter by; None where that is near the stated one, or nothing."""
     scale = ReadingScale.of(readings, stated)
-    deviation = scatter(scale.stabilised(readings), time, run)
+    stabilised = scale.stabilised(readings)
+    deviation = scatter(stabilised, time, run)
+    if deviation < scale.deviation / NEAR:
+        # Readings that stay at exactly 0 have no error, whatever the others have: the sun at night, an axis at rest.
+        rest = at_rest(readings, np.flatnonzero(np.diff(run, prepend=run[:1] - 1)))
+        deviation = min(max(deviation, scatter(np.where(rest, np.nan, stabilised), time, run)), scale.deviation)
     if deviation <= LEAST_SCATTER * float(np.nanstd(readings)) or deviation / NEAR < scale.deviation < deviation * NEAR:
         return None
     if not scale.deviation:
@@ -89,14 +94,11 @@ def _by_scatter(readings: Array, time: Array, run: NDArray[np.int64], stated: Se
 def scatter(values: Array, time: Array, run: NDArray[np.int64]) -> float:
     """Return the standard deviation of white noise in readings (time, wheel), by differences within a run.
 
-    Readings that stay at exactly 0 have no error: the sun at night, an axis at rest. The median of the others'
-    differences does not see steps. What the column itself does adds to them, the less the higher their order is, and
+    Their median does not see steps. What the column itself does adds to them, the less the higher their order is, and
     noise adds the same to each: the least counts. 0 where more than half of them are 0: a column that is set, or
     rounded. A course that goes to and fro within a few readings adds to all orders; noise is then what is left of
     whole windows (`noise_floor`).
     """
-    starts = np.flatnonzero(np.diff(run, prepend=run[:1] - 1))
-    values = np.where(at_rest(values, starts), np.nan, values)
     found = []
     for order in ORDERS[: max(len(run) - 1, 0)]:
         same = (run[order:] == run[: len(run) - order])[:, None]

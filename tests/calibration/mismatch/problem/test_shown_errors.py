@@ -10,7 +10,7 @@ import pytest
 
 from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.problem.shown_errors import scatter
+from regolithd.calibration.mismatch.problem.shown_errors import _by_scatter, scatter
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 
 if TYPE_CHECKING:
@@ -96,9 +96,16 @@ def test_noise_that_nobody_stated_is_no_physics(seed: int) -> None:
     assert gain.value == pytest.approx(0.051, rel=0.005)
 
 
-def test_readings_that_stay_at_zero_have_no_scatter() -> None:
-    """The sun is 0 for half of the time, without any error; by day its readings scatter as they do."""
-    random, time, run = np.random.default_rng(5), np.arange(COUNT) * 300.0, np.zeros(COUNT, np.int64)
-    sun = np.maximum(800 * np.sin(np.arange(COUNT) * 2 * np.pi / 288), 0.0)[:, None]
-    read = np.where(sun > 0, sun + 10 * random.normal(size=sun.shape), 0.0)
-    assert scatter(read, time, run) == pytest.approx(10, rel=0.15)
+def test_a_stated_error_is_not_smaller_by_readings_that_stay_at_zero() -> None:
+    """The sun is 0 for more than half of the time, without any error; by day its readings scatter as is stated."""
+    random, rows = np.random.default_rng(5), np.arange(COUNT)
+    sun = np.maximum(800 * np.sin(rows * 2 * np.pi / 288) - 100, 0.0)
+    read = sun * (1 + 0.05 * random.normal(size=COUNT))
+    water = np.convolve(sun, np.ones(30) / 30, "same") * 0.01 + 0.05 * random.normal(size=COUNT)
+    recording = from_columns({"t_s": rows * 300.0, "load_N": read, "current_A": water})
+    sunny = Slide()
+    sunny.sensors = {"load_N": SensorError(relative=0.05)}
+    assert not [note for note in inputs_of(recording, sunny).expected.notes if "scatter" in note]
+    smaller = recording.with_channels(load_N=(sun * (1 + 0.005 * random.normal(size=COUNT)))[:, None])
+    assert _by_scatter(smaller.channels["load_N"], smaller.time_s, smaller.run, sunny.sensors["load_N"]) is not None
+    assert _by_scatter(recording.channels["load_N"], recording.time_s, recording.run, sunny.sensors["load_N"]) is None
