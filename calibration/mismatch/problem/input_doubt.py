@@ -137,7 +137,8 @@ def input_doubt(
         if unknown.probability.any():
             one, other = (asked.change(name, each) for each in unknown.ways)
             variance = unknown.probability * (one - other) ** 2
-            doubts.append(InputDoubt(variance, in_common * unknown.readings * variance, 0 * variance, asked.none))
+            together = in_common * unknown.readings * variance
+            doubts.append(InputDoubt(variance, together, np.zeros_like(variance), asked.none))
     draws = np.zeros((DRAWS if lasting else 0, *asked.before.shape))
     for place in range(len(draws)):
         lots = {name: error * random.choice([-1.0, 1.0], size=(len(error), 1)) for name, error in stated.items()}

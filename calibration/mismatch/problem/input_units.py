@@ -66,14 +66,15 @@ def notes_on_units(
     predict: Callable[[Recording], Array],
     predicted: Callable[[], Array],
 ) -> Iterator[str]:
-    """Yield a note for each input that is likely in another unit, and none for the predicted column.
+    """Yield a note for each input that is likely in another unit.
 
     `predict` runs the simulation as it is stated; `predicted` returns what it predicts from the readings as they are.
 
     Raises
     ------
     RecordingError
-        Where the simulation, from the readings as they are, is worse than the mean of what it predicts.
+        Where the simulation, from the readings as they are, is worse than the mean of what it predicts; and where that
+        is in another unit.
     """
     measured, columns = recording.channel(simulation.channel), simulation.inputs
     _check_predicted(simulation.channel, measured, predicted)
@@ -110,7 +111,7 @@ def notes_on_units(
 def _check_predicted(channel: str, measured: Array, predicted: Callable[[], Array]) -> None:
     """Raise an error where the predicted column is likely in another unit: its readings explain nothing as they are."""
     stated = MISTAKABLE.fullmatch(channel)
-    if stated is None:
+    if stated is None or not np.isfinite(measured).any():
         return
     prediction, variance = predicted(), float(np.nanvar(measured))
     for factor, offset, unit in CONVERSIONS[stated[1]]:

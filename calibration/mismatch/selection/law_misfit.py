@@ -51,7 +51,7 @@ def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[T
     law of a speed, a load or a temperature misses what repeats with the angle: a ripple holds as little of any.
     """
     partly = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
-    if all(term.name == WheelAngleRipple.name for term in further):
+    if further and all(term.name == WheelAngleRipple.name for term in further):
         partly = [index for index, term in enumerate(names.terms) if term.name != WheelAngleRipple.name]
     changed = any(term.group.is_change for term in names.terms)
     follows = any(term.name == SensorDelay.name or is_of_the_prediction(equations.problem, term) for term in further)
