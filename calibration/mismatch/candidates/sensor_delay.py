@@ -10,6 +10,7 @@ from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE,
 from regolithd.calibration.mismatch.candidates.lag_scan import best_lag
 from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
 from regolithd.calibration.mismatch.problem.limits import at_limit
+from regolithd.calibration.mismatch.signal.stretches import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -269,8 +270,7 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
     direction = problem.covariates.get("direction", np.zeros_like(found))
     for k in range(found.shape[1]):
         blank = np.isnan(found[:, k])
-        edges = np.flatnonzero(np.diff(blank, prepend=False, append=False))
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
+        for first, end in stretches(blank):
             standing = _standing(direction[:, k], first, end)
             found[first : standing.start, k] = found[max(first - 1, 0), k]
             found[standing.stop : end, k] = found[min(end, len(found) - 1), k]

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.stretches import stretches
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -175,9 +177,9 @@ def _sign_beyond(speed: Array, reach: float) -> Array:
 def _stays_within(speed: Array, reach: float) -> NDArray[np.bool_]:
     """Return where a speed (time,) is within a reach of 0, and stays so for some readings."""
     within = np.abs(speed) <= reach
-    edges = np.flatnonzero(np.diff(within.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    for first, last in edges[np.diff(edges, axis=1)[:, 0] < STANDING_READINGS].tolist():
-        within[first:last] = False
+    for first, last in stretches(within):
+        if last - first < STANDING_READINGS:
+            within[first:last] = False
     return within
 
 

@@ -21,6 +21,7 @@ from regolithd.calibration.mismatch.signal.stein import (
     consistent,
     consistent_throughout,
 )
+from regolithd.calibration.mismatch.signal.stretches import stretches
 from regolithd.calibration.mismatch.signal.wiener_filter import best_filter, even_pieces
 
 Array = NDArray[np.float64]
@@ -179,9 +180,8 @@ def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> Nor
     for a direction would let friction reverse there.
     """
     near = np.abs(np.nan_to_num(smooth.mean, nan=np.inf)) <= REST_DEVIATIONS * np.sqrt(smooth.variance)
-    edges = np.flatnonzero(np.diff(near.astype(np.int8), prepend=0, append=0))
     mean = smooth.mean.copy()
-    for first, last in edges.reshape(-1, 2).tolist():
+    for first, last in stretches(near):
         read = readings[first:last]
         read = read[np.isfinite(read)]
         if len(read) < FEWEST_AT_REST:

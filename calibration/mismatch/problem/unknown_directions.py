@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.errors_in_variables import at_rest
 from regolithd.calibration.mismatch.problem.true_values import FEWEST_AT_REST, direction_beside_rest
+from regolithd.calibration.mismatch.signal.stretches import stretches
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
@@ -81,9 +82,3 @@ def _motion_at_ends(column: Array, still: NDArray[np.bool_]) -> Array:
             found[first : first + AT_AN_EDGE] = np.sign(column[first - 1]) if first else 0.0
             found[end - AT_AN_EDGE : end] = np.sign(column[end]) if end < len(column) else 0.0
     return found
-
-
-def stretches(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return where stretches of what is true (time,) begin and end."""
-    edges = np.flatnonzero(np.diff(where, prepend=False, append=False)).reshape(-1, 2)
-    return [(int(first), int(end)) for first, end in edges]

@@ -195,18 +195,19 @@ class NormalEquations:
     def needed_beside_errors(self, given: Iterable[Term], term: Term) -> float:
         """Return the Δχ² that a term has to gain beside others beyond what inputs' errors that last give it.
 
-        These give it the mean of mᵀ S⁻¹ m over draws of them, with m the moments of its columns and S their Schur
-        complement: right on average, however few the draws are. 0 where no errors last.
+        These give it what it gains in a fit to draws of them: right on average, however few the draws are. 0 where no
+        errors last.
         """
         if not has_lasting_errors(self.problem):
             return 0.0
         columns = self.columns_of((*given, term))
-        size, errors = len(columns) - len(term.group.columns), self.moments_of_errors(columns)
-        matrix, _ = self._normal(columns)
-        inverse, cross = pseudo_inverse(matrix[:size, :size], SINGULAR), matrix[:size, size:]
-        complement = schur_complement(matrix[size:, size:], cross, inverse)
-        beside = errors[:, size:] - errors[:, :size] @ inverse @ cross
-        return BY_ERRORS * float(np.sum(pseudo_inverse(complement, SINGULAR) * covariance_of_scores(beside)))
+        matrix, scores = self._normal(columns)[0], covariance_of_scores(self.moments_of_errors(columns))
+
+        def explained(size: int) -> float:
+            """Return the Δχ² of the first columns, on average over the draws."""
+            return float(np.sum(pseudo_inverse(matrix[:size, :size], SINGULAR) * scores[:size, :size]))
+
+        return BY_ERRORS * (explained(len(columns)) - explained(len(columns) - len(term.group.columns)))
 
     def penalty(self, term: Term) -> float:
         """Return what a term has to gain beyond chance, in Δχ²."""

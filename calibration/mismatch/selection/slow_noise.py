@@ -6,7 +6,6 @@ it gains by the weights what it does not gain in likelihood: a slow spectrum exp
 
 from __future__ import annotations
 
-from itertools import islice
 from math import inf, log
 from typing import TYPE_CHECKING
 
@@ -138,22 +137,17 @@ def _over_another_covariate(
     def evidence(score: float, term: Term) -> float:
         return score - further * len(term.group.columns)
 
-    rivals = [
-        (evidence(each, term), term)
+    near = [
+        (each, term)
         for each, term in curves
-        if term.wheels == curve.wheels
-        and term.group.coupling not in WITHOUT_CURVE
-        and each >= (1 - limits.form_misfit) * score
+        if term.wheels == curve.wheels and each >= (1 - limits.form_misfit) * score
     ]
+    rivals = [(evidence(each, term), term) for each, term in near if term.group.coupling not in WITHOUT_CURVE]
     most, other = max(rivals, key=lambda pair: pair[0], default=(-inf, curve))
     if most > evidence(score, curve) and score_beside_slow_noise(equations, given, [other]) > limits.slow_noise_entry:
         return other
-    alike = (
-        term
-        for each, term in curves
-        if term.wheels == curve.wheels and term.name != "time" and each >= (1 - limits.form_misfit) * score
-    )
-    in_slow_noise = [(score_beside_slow_noise(equations, given, [term]), term) for term in islice(alike, RIVALS)]
+    others = [term for _, term in near if term.name != "time"][:RIVALS]
+    in_slow_noise = [(score_beside_slow_noise(equations, given, [term]), term) for term in others]
     most, other = max(in_slow_noise, key=lambda pair: pair[0], default=(-inf, curve))
-    least = score_beside_slow_noise(equations, given, [curve]) + limits.smooth_term_entry
-    return other if most > least else curve
+    ahead = most > -inf and most > score_beside_slow_noise(equations, given, [curve]) + limits.smooth_term_entry
+    return other if ahead else curve

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.robust import robust_std
+from regolithd.calibration.mismatch.signal.stretches import stretches
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
@@ -48,8 +49,7 @@ def jumps(course: Array, breaks: Index = NONE, least: float = 0.0, thresholds: T
             continue  # medians take a hundred times as long
         medians = np.median(sliding_window_view(course, length), axis=-1)
         deviates = np.where(np.abs(medians[length:] - medians[:-length]) > least, _deviates(medians, together), 0.0)
-        edges = np.flatnonzero(np.diff(deviates > BESIDE * thresholds.most_jump_deviates, prepend=False, append=False))
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
+        for first, end in stretches(deviates > BESIDE * thresholds.most_jump_deviates):
             jump = first + int(np.argmax(deviates[first:end])) + length
             near = [other for other in found if abs(jump - other) <= length]
             is_certain = bool(deviates[first:end].max() > thresholds.most_jump_deviates)

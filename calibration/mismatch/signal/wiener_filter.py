@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.smoothing_spline import BRIDGED, even_steps
 from regolithd.calibration.mismatch.signal.stein import Estimate, squared_error
+from regolithd.calibration.mismatch.signal.stretches import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -135,8 +136,7 @@ def even_pieces(readings: Array, time: Array, run: NDArray[np.int64]) -> list[sl
     known = np.flatnonzero(np.isfinite(readings))
     for place in np.flatnonzero(np.diff(known) > BRIDGED + 1):
         within[known[place] : known[place + 1]] = False
-    edges = np.flatnonzero(np.diff(within.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    return [slice(int(first), int(last) + 1) for first, last in edges]
+    return [slice(first, last + 1) for first, last in stretches(within)]
 
 
 def _windows(filled: Array, told: NDArray[np.bool_], pieces: Sequence[slice], half_width: int) -> Array:

@@ -12,7 +12,6 @@ from regolithd.calibration.mismatch.problem.unknown_directions import (
     AT_AN_EDGE,
     LONGEST_START,
     UnknownDirections,
-    stretches,
 )
 
 Array = NDArray[np.float64]
@@ -62,9 +61,3 @@ def test_what_seems_to_rest_may_move_at_its_ends() -> None:
     np.testing.assert_array_equal(found.probability[:, 0], np.where(moving != 0, 0.5, 0.0))
     np.testing.assert_array_equal(np.sign(found.ways[0] - found.ways[1])[:, 0], moving)
     assert not directions(values, values).probability.any()
-
-
-def test_stretches_begin_and_end_where_it_is_true() -> None:
-    """Also at the ends."""
-    assert stretches(np.array([True, False, True, True])) == [(0, 1), (2, 4)]
-    assert stretches(np.zeros(3, np.bool_)) == []
