@@ -1,6 +1,7 @@
 """Several predicted channels: each is compared by itself, and all together have the simulation's parameters.
 
-each channel alone ─▶ near each other ─▶ parameters from all ─▶ where these contradict a prior: again ─▶ one comparison
+each channel alone ─▶ near each other ─▶ one that contradicts the others: again, with parameters as these have them
+                                      ─▶ parameters from all ─▶ where these contradict a prior: again ─▶ one comparison
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from regolithd.calibration.mismatch.calibration.step import Step
+from regolithd.calibration.mismatch.inference.contradictions import contradictions, is_told, known_apart, told_apart
 from regolithd.calibration.mismatch.inference.joint_parameters import joint_posterior, known_better_by_others
 from regolithd.calibration.mismatch.inference.several_channels import (
     merged_answers,
@@ -24,30 +26,36 @@ from regolithd.calibration.mismatch.inference.several_channels import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from regolithd.calibration.mismatch.inference.contradictions import Apart
     from regolithd.calibration.mismatch.inference.joint_parameters import JointPosterior
     from regolithd.calibration.mismatch.result import Comparison
+    from regolithd.calibration.mismatch.simulation.known_together import Known, KnownTogether
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
-
-    Known = Mapping[str, tuple[float, float]]
 
 LINEARISATIONS = 3
 """Comparisons of a channel with what the others know of hardly known parameters, at most (a choice: one is usual)."""
 
 
 class CompareChannel(Protocol):
-    """The comparison of one channel, with these means and standard deviations of parameters instead of the stated."""
+    """The comparison of one channel, with these means and standard deviations of parameters instead of the stated.
 
-    def __call__(self, channel: str, known: Known, /) -> Comparison:
+    `together` are parameters that are known in combinations.
+    """
+
+    def __call__(self, channel: str, known: Known, together: KnownTogether | None = None, /) -> Comparison:
         """Return the comparison of a channel."""
 
 
 def compare_channels(simulation: Simulation, channels: Sequence[str], of_channel: CompareChannel) -> Comparison:
     """Return the comparison of these channels of a simulation, each posed by itself first.
 
-    Where all channels together contradict a stated parameter, they are compared again with it as they have it. If that
-    is not all that is wrong, a channel that pulls a parameter out of its prior is told what the others know of it.
+    Where one channel contradicts the others, it is compared again with the parameters as these have them. Where all
+    channels together contradict a stated parameter, they are compared again with it as they have it. If that is not all
+    that is wrong, a channel that pulls a parameter out of its prior is told what the others know of it.
     """
     alone, near = _near_each_other(simulation, channels, of_channel)
+    if apart := _one_apart(simulation, alone, of_channel):
+        return _merged(apart, simulation)
     answers = [each.answer for each in alone.values()]
     if restated := _joint(alone.values(), simulation).restated(simulation.parameters):
         again = [of_channel(channel, {**near[channel], **restated}) for channel in channels]
@@ -97,6 +105,30 @@ def _near_each_other(
             break
         alone |= again
     return alone, near
+
+
+def _one_apart(simulation: Simulation, alone: Mapping[str, Comparison], of_channel: CompareChannel) -> list[Comparison]:
+    """Return the comparisons with that channel's again which contradicts the others; nothing where none does.
+
+    Of several that may be the one, and in which it shows as something that is left out, the most probable is taken.
+    """
+    priors, answers = simulation.parameters, {name: one.answer for name, one in alone.items()}
+    informations = {
+        name: one.information for name, one in alone.items() if one.information and not answers[name].unexplained
+    }
+    found: list[tuple[Apart, Comparison]] = []
+    for apart in contradictions(priors, informations):
+        together = apart.known(priors)
+        again = of_channel(apart.channel, {}, together)
+        if again.information and is_told(again.answer, answers[apart.channel]):
+            known = known_apart(again.information, together)
+            found.append((apart.told_by(known, informations[apart.channel]), replace(again, information=known)))
+    if not found:
+        return []
+    found.sort(key=lambda each: -each[0].evidence)
+    told = told_apart([(apart, again.answer) for apart, again in found], list(alone))
+    first, again = found[0]
+    return [replace(again, answer=told) if name == first.channel else one for name, one in alone.items()]
 
 
 def _is_bent_up_to(values: Mapping[str, float], one: Comparison) -> bool:

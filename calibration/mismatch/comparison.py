@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
+    from regolithd.calibration.mismatch.simulation.known_together import Known, KnownTogether
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 
@@ -150,9 +151,9 @@ def compare(
     effects = simulation.corrected_effects if effects is None else effects
     if simulation.channels:
 
-        def of_channel(channel: str, known: Mapping[str, tuple[float, float]]) -> Comparison:
+        def of_channel(channel: str, known: Known, together: KnownTogether | None = None) -> Comparison:
             own = [effect for effect in effects if effect.channel == channel]
-            one = OneChannel(simulation, channel, known)
+            one = OneChannel(simulation, channel, known, together)
             return labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
 
         blank = [name for name in simulation.channels if recorded.holds_no_reading(name)]

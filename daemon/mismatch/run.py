@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer
 
 
+LIKELY = 0.5
+"""Probability of an answer below which another is as likely as it, so that its corrected file is warned of."""
+
 NO_FLEET = FleetOptions()
 """No option that only a fleet has."""
 
@@ -59,4 +62,10 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
             found.write_corrected(outputs.corrected, empirical=outputs.empirical)
         except MismatchError as error:
             raise MismatchError(f"{outputs.corrected} is not written: {error}") from error
+        if (probability := found.answer.probability) is not None and probability < LIKELY:
+            typer.echo(
+                f"{outputs.corrected}: it holds an answer with a probability of {probability:.2g}; look at what else "
+                "may be true, and record what tells them apart, before you use it",
+                err=True,
+            )
     return found.answer

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.inference.intervals import Drawn
     from regolithd.calibration.mismatch.problem.prior import Prior
-    from regolithd.calibration.mismatch.selection.decision import Decision
+    from regolithd.calibration.mismatch.selection.decision import Decision, FitQuality
 
 Array = NDArray[np.float64]
 
@@ -43,12 +43,14 @@ class Information:
     matrix: M, shape (parameter, parameter)
     vector: v, shape (parameter,)
     held: those that the comparison held at a value because of their bounds
+    quality: how well all that was found explains the channel; None: not known
     """
 
     names: tuple[str, ...]
     matrix: Array
     vector: Array
     held: Mapping[str, float]
+    quality: FitQuality | None = None
 
 
 def information_of(decision: Decision, drawn: Drawn | None) -> Information:
@@ -62,7 +64,7 @@ def information_of(decision: Decision, drawn: Drawn | None) -> Information:
     matrix, moment = matrix * np.outer(scale, scale), moment * scale
     at = np.array([problem.values[name] for name in names], np.float64)
     held = {name: problem.values[name] for name in problem.held & set(problem.values)}
-    return Information(names, matrix, moment + matrix @ at, held)
+    return Information(names, matrix, moment + matrix @ at, held, decision.quality)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +74,8 @@ class JointPosterior:
     Attributes
     ----------
     names: of the parameters
-    shifts, stds: from the stated values, and their standard deviations, in those of the stated priors
+    shifts: from the stated values, in standard deviations of the stated priors, shape (parameter,)
+    covariance: of the shifts, shape (parameter, parameter)
     evidence: minus the χ² of readings and priors, less what parameters outside of their priors are charged, but for a
         constant
     held: values of parameters that a channel's comparison held because of their bounds
@@ -81,10 +84,15 @@ class JointPosterior:
 
     names: tuple[str, ...]
     shifts: Array
-    stds: Array
+    covariance: Array
     evidence: float
     held: Mapping[str, float]
     released: tuple[str, ...] = ()
+
+    @property
+    def stds(self) -> Array:
+        """Standard deviations of the shifts, in those of the stated priors."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def too_far(self, priors: Mapping[str, Prior]) -> bool:
         """Return whether a released parameter goes further than a wrong statement explains."""
@@ -128,7 +136,7 @@ def joint_posterior(
     `lead_margin` even after what a wrong statement is charged, and no parameter goes further than a wrong statement
     explains. Of parameters that could stand for each other the one with most evidence is released, or all together.
     """
-    likelihood = _Likelihood.of(priors, informations)
+    likelihood = Likelihood.of(priors, informations)
     within = likelihood.posterior(())
     if not may_release:
         return within
@@ -158,7 +166,7 @@ def known_better_by_others(
 
 
 @dataclass(frozen=True, eq=False)
-class _Likelihood:
+class Likelihood:
     """The channels' informations together, of shifts from the stated values in standard deviations of the priors."""
 
     names: tuple[str, ...]
@@ -168,7 +176,7 @@ class _Likelihood:
     reach: Array
 
     @classmethod
-    def of(cls, priors: Mapping[str, Prior], informations: Sequence[Information]) -> _Likelihood:
+    def of(cls, priors: Mapping[str, Prior], informations: Sequence[Information]) -> Likelihood:
         """Return the sum; a parameter that a channel holds at a value has it in all."""
         held = {name: value for each in informations for name, value in each.held.items()}
         names = tuple(name for name, prior in priors.items() if prior.std > 0 and name not in held)
@@ -194,5 +202,10 @@ class _Likelihood:
         evidence = -float(chi2) - sum(
             price_of_wrong_statement(abs(float(shifts[place])), float(self.reach[place])) for place in released
         )
-        stds, names = np.sqrt(np.maximum(np.diag(covariance), 0.0)), tuple(self.names[place] for place in released)
-        return JointPosterior(self.names, shifts, stds, evidence, self.held, names)
+        names = tuple(self.names[place] for place in released)
+        return JointPosterior(self.names, shifts, covariance, evidence, self.held, names)
+
+    def evidence_without_priors(self) -> float:
+        """Return minus the least χ² of the readings alone, of parameters anywhere that a wrong statement goes to."""
+        shifts = pseudo_inverse(self.matrix + np.diag(self.reach**-2.0), SINGULAR) @ self.vector
+        return float(2 * self.vector @ shifts - shifts @ self.matrix @ shifts)

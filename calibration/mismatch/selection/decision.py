@@ -56,6 +56,29 @@ UNEXPLAINED = "unexplained"
 """What stands for a curve among the names of an answer."""
 
 
+@dataclass(frozen=True)
+class FitQuality:
+    """How well a fit explains the readings, and by how much that it is charged for.
+
+    Attributes
+    ----------
+    readings: independent ones
+    power_left: mean square of what is left of the compared readings
+    charged: Δχ² that the fit's terms are charged: by their penalties, and for their entry
+    """
+
+    readings: float
+    power_left: float
+    charged: float
+
+    def evidence_over(self, other: FitQuality) -> float:
+        """Return by how much the evidence, in Δχ², is larger than that of another fit to the same readings.
+
+        Both may have simulated other inputs: they are compared by the power of what they leave.
+        """
+        return self.readings * float(np.log(other.power_left / self.power_left)) + other.charged - self.charged
+
+
 @dataclass(frozen=True, eq=False)
 class Intermittent:
     """A curve over time that stands for what comes and goes, which no curve describes.
@@ -157,19 +180,16 @@ class Decision:
         return not self.unnamed and independent * (self.power_left / other.power_left - 1) <= by_chance
 
     def is_as_probable_as(self, other: Decision) -> bool:
-        """Return whether another decision leaves less by no more than its further terms are charged.
-
-        Both may have simulated other inputs: they are compared by the power of what they leave.
-        """
-        independent = float(self.equations.problem.mask.sum()) / self.noise.autocorrelation_time
-        gained = independent * np.log(self.power_left / other.power_left)
-        return bool(gained <= other._charged - self._charged)
+        """Return whether another decision leaves less by no more than its further terms are charged."""
+        return self.quality.evidence_over(other.quality) >= 0
 
     @property
-    def _charged(self) -> float:
-        """Δχ² that the terms are charged: by their penalties, and for their entry."""
+    def quality(self) -> FitQuality:
+        """How well all that was found explains the readings."""
         terms = self.whole.terms
-        return entry_cost(self.equations, terms, self.entry_threshold) + sum(map(self.equations.penalty, terms))
+        charged = entry_cost(self.equations, terms, self.entry_threshold) + sum(map(self.equations.penalty, terms))
+        independent = float(self.equations.problem.mask.sum()) / self.noise.autocorrelation_time
+        return FitQuality(independent, self.power_left, charged)
 
     @property
     def is_late_alone(self) -> bool:

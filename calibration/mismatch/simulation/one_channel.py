@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.simulation.known_together import Known, KnownTogether
 
 Array = NDArray[np.float64]
 
@@ -24,13 +25,18 @@ Array = NDArray[np.float64]
 class OneChannel(Simulation):
     """A view of a simulation that predicts one of its channels; all else is the simulation's own.
 
-    `known` has the mean and the standard deviation of parameters that are known better than was stated.
+    `known` has the mean and the standard deviation of parameters that are known better than was stated; `together`,
+    such as are known in combinations, in whose place others stand.
     """
 
     def __init__(
-        self, simulation: Simulation, channel: str, known: Mapping[str, tuple[float, float]] | None = None
+        self,
+        simulation: Simulation,
+        channel: str,
+        known: Known | None = None,
+        together: KnownTogether | None = None,
     ) -> None:
-        self._whole = simulation
+        self._whole, self._together = simulation, together
         self.channel, self.unit = channel, simulation.channels[channel]  # type: ignore[misc]
         for name in (
             "wheel_column",
@@ -52,6 +58,8 @@ class OneChannel(Simulation):
             setattr(self, name, getattr(simulation, name))
         for name, (value, std) in (known or {}).items():
             self.parameters = {**self.parameters, name: replace(self.parameters[name], value=value, std=std)}
+        if together:
+            self.parameters = together.priors(self.parameters)
         self.empirical_curves = [each for each in simulation.empirical_curves if each.channel == channel]
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
@@ -62,7 +70,8 @@ class OneChannel(Simulation):
         SimulationError
             When the simulation returns no such channel.
         """
-        predicted: Any = self._whole.predict(inputs, values)
+        of_all = self._together.values(values) if self._together else values
+        predicted: Any = self._whole.predict(inputs, of_all)
         try:
             return np.asarray(predicted[self.channel], np.float64)
         except (KeyError, TypeError, IndexError) as error:

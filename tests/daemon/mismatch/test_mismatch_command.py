@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,10 @@ import pytest
 from typer.testing import CliRunner
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.daemon.cli import app
+from regolithd.daemon.mismatch import run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -120,6 +123,23 @@ def test_a_corrected_file_in_another_folder_finds_the_class(start: Path, tmp_pat
     assert done.exit_code == 0, done.output
     assert tomllib.loads(new.read_text())["simulation"] == {"model": "my_simulation:Joint", "path": "../../start"}
     assert load_simulation(new).channel == "torque_Nm"
+
+
+@pytest.mark.parametrize(("probability", "lines"), [(0.03, 1), (0.97, 0), (None, 0)])
+def test_a_corrected_file_of_an_improbable_answer_is_warned_of(
+    probability: float | None, lines: int, start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is written all the same, and the warning names it and the probability."""
+
+    def less_sure(*given: object, **options: object) -> object:
+        found = compare(*given, **options)  # type: ignore[arg-type]
+        return replace(found, answer=replace(found.answer, probability=probability))
+
+    monkeypatch.setattr(run, "compare", less_sure)
+    new = tmp_path / "NEW.toml"
+    done = call(joint(tmp_path / "a.csv", 0), "--simulation", start / "SIM.toml", "--corrected", new)
+    assert (done.exit_code, new.exists()) == (0, True)
+    assert done.stderr.count(f"{new}: it holds an answer with a probability of 0.03; ") == lines
 
 
 def test_an_output_that_cannot_be_written_is_told_before_anything_is_computed(start: Path, tmp_path: Path) -> None:
