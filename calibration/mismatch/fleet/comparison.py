@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 from regolithd.calibration.mismatch import comparison as single
 from regolithd.calibration.mismatch.data.recording import as_recording
@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows, write_catalogue
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
 from regolithd.calibration.mismatch.fleet.choice.earned import earned
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, Level, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
@@ -25,7 +25,7 @@ from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.told.joint import joint_parameters
 from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
-from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of, placed
+from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, finer_grid, grid_of, placed
 from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
@@ -298,25 +298,54 @@ def _of_channel(
         lambda n, result: columns.without(members[n].name, result),
     )
     kept = sorted(found)
-    members, results = [members[n] for n in kept], [found[n] for n in kept]
-    grid = grid_of(forms_of(simulation), results, 0, [member.rover for member in members])
-    laws: Laws = tuple((group.candidate.name, group.shape) for group in grid)
-    sums = work.done(
-        "summing",
-        members,
-        lambda n: partial(_sum, members[n].read, load, channel, laws, columns.restored(members[n].name, results[n])),
-        json.dumps((channel, laws), sort_keys=True),
-    )
-    kept = sorted(sums)
-    names = _names([members[n] for n in kept])
-    equations = _equations([sums[n] for n in kept], names, [members[n] for n in kept], grid, level)
-    work.progress("searching", len(kept), len(kept))
-    places = places_of(equations)
-    chooser = Chooser(equations, places, entry_threshold(equations, places))
-    of_recordings = tuple(results[n] for n in kept)
-    fit = earned(chooser, chooser.chosen(), of_recordings)
-    chooser = replace(chooser, equations=with_released(equations, fit, of_recordings, simulation.parameters))
-    return Chosen(chooser, chooser.equations.fit(fit.terms), names, of_recordings, simulation)
+    compared = _Compared([members[n] for n in kept], [found[n] for n in kept], columns)
+    grid = grid_of(forms_of(simulation), compared.found, 0, [member.rover for member in compared.members])
+    searched = compared.searched(grid, load, channel, level, work)
+    finer = finer_grid(grid, [term.group for term in searched.fit.terms], compared.found)
+    if len(finer) > len(grid):
+        searched = compared.searched(finer, load, channel, level, work)
+    chooser, results = searched.chooser, searched.found
+    fit = earned(chooser, searched.fit, results)
+    chooser = replace(chooser, equations=with_released(chooser.equations, fit, results, simulation.parameters))
+    return Chosen(chooser, chooser.equations.fit(fit.terms), searched.names, results, simulation)
+
+
+class _Searched(NamedTuple):
+    """A choice from the sums of the recordings that could be summed."""
+
+    chooser: Chooser
+    fit: FleetFit
+    names: Names
+    found: tuple[Found, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Recordings that were compared each by itself, what was found in them, and the columns of that."""
+
+    members: Sequence[Member]
+    found: Sequence[Found]
+    columns: KeptColumns
+
+    def searched(
+        self, grid: Sequence[GridGroup], load: Callable[[], Simulation], channel: str, level: Level, work: _Work
+    ) -> _Searched:
+        """Sum the products of the recordings' columns in a common grid, and choose the effects of the fleet."""
+        laws: Laws = tuple((group.candidate.name, group.shape) for group in grid)
+        members, found, restored = self.members, self.found, self.columns.restored
+        sums = work.done(
+            "summing",
+            members,
+            lambda n: partial(_sum, members[n].read, load, channel, laws, restored(members[n].name, found[n])),
+            json.dumps((channel, laws), sort_keys=True),
+        )
+        kept = sorted(sums)
+        names = _names([members[n] for n in kept])
+        equations = _equations([sums[n] for n in kept], names, [members[n] for n in kept], grid, level)
+        work.progress("searching", len(kept), len(kept))
+        places = places_of(equations)
+        chooser = Chooser(equations, places, entry_threshold(equations, places))
+        return _Searched(chooser, chooser.chosen(), names, tuple(found[n] for n in kept))
 
 
 def _names(members: Sequence[Member]) -> Names:

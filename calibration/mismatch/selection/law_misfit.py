@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
-from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.problem.covariates import quantity
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
@@ -45,18 +43,16 @@ def misfit_beside(equations: NormalEquations, names: Fit, with_curve: Fit) -> fl
 def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[Term]) -> float:
     """Return the Δχ² of names of which further terms can hold a share as their misfit.
 
-    What an inexact law leaves is a share of the law, reading by reading. A delay acts where the prediction changes, and
-    explains more than any load there: a term that it hardly follows (a shadow over the sun's azimuth) holds little of
-    what its law misses, however much it explains. What follows the prediction, or is a further delay, holds it all. No
-    law of a speed, a load or a temperature misses what repeats with the angle: a ripple holds as little of any.
+    What an inexact law leaves is a function of its covariate: a further law over that, over the prediction, or of
+    nothing (a constant, a delay) can hold it all. One over another covariate holds as much of it as of the law itself,
+    beside the parameters: a ripple over the angle hardly anything of a drag, a curve over the sun's azimuth hardly
+    anything of what a delay changes wherever the prediction does.
     """
-    partly = [index for index, term in enumerate(names.terms) if term.name == SensorDelay.name]
-    if further and all(term.name == WheelAngleRipple.name for term in further):
-        partly = [index for index, term in enumerate(names.terms) if term.name != WheelAngleRipple.name]
+    over = {term.imitated_over for term in further}
     changed = any(term.group.is_change for term in names.terms)
-    follows = any(term.name == SensorDelay.name or is_of_the_prediction(equations.problem, term) for term in further)
-    if not partly or changed or follows:
+    if changed or "none" in over or any(is_of_the_prediction(equations.problem, term) for term in further):
         return explained(equations, names)
+    partly = [index for index, term in enumerate(names.terms) if term.imitated_over not in over]
     others = equations.fit([term for index, term in enumerate(names.terms) if index not in partly])
     by_these = names.delta_chi2 - others.delta_chi2
     size = np.zeros(len(names.columns))

@@ -13,7 +13,6 @@ from regolithd.calibration.mismatch.answer import FitImprovement, Parameter
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
-from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, relative_size
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
     FleetEffect,
@@ -24,7 +23,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 )
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
-from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
+from regolithd.calibration.mismatch.fleet.told.sizes import parameters_of, size_with_std
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.prior import parted_own_name
 from regolithd.calibration.mismatch.problem.problem import LeftOut
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Effect, Verdict
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
+    from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
     from regolithd.calibration.mismatch.fleet.work.found import Found
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
@@ -192,16 +192,11 @@ def _sizes(chosen: Chosen, index: int, beside: Beside) -> dict[str, Parameter]:
     """Return coefficients, shape parameters and relative size with their intervals."""
     fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
     found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
-    group, span = fit.terms[index].group, fit.spans[index]
-    size = relative_size(chosen.equations, fit, index, active_share=0.0)
-    mean, std = mean_sizes(fit.coefficients[span], stds[span], len(group.columns))
-    if group.of_wheels:
-        first = next(iter(found.values()))
-        mean, std = np.array([first.value]), np.array([(first.high - first.low) / 2 / NINETY_PERCENT_STDS])
-    share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
+    size, std = size_with_std(chosen.equations, beside.equations, fit, index)
+    reach = NINETY_PERCENT_STDS * std
     course = fit.terms[index].course
     grown = {"growth_power": Parameter(course.power, np.nan, np.nan, "1")} if course.kind == "growing" else {}
-    return {**found, **grown, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
+    return {**found, **grown, "relative_size": Parameter(size, size - reach, size + reach, "1")}
 
 
 def _form_of(term: FleetTerm) -> str:

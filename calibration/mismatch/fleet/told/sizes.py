@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
+from regolithd.calibration.mismatch.fleet.choice.selection import relative_size
 from regolithd.calibration.mismatch.inference.intervals import OF_SIGN, unit_of
 from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+SLOPE_STEP = 1e-4
+"""Step of a coefficient for the slope of the size, as a share of the largest (double precision)."""
 ANY = (-np.inf, np.inf)
 """Bounds of what may have any value."""
 
@@ -48,6 +51,35 @@ def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
 def _as_a_whole(sizes: Array, stds: Array) -> Array:
     """Return standard deviations of sizes with the share by which all of them are off, as in one recording."""
     return np.hypot(stds, THRESHOLDS.size_discrepancy_std * sizes)
+
+
+def size_with_std(equations: FleetEquations, beside: FleetEquations, fit: FleetFit, index: int) -> tuple[float, float]:
+    """Return a term's relative size and its standard deviation.
+
+    That of all its coefficients, and of its shape, by the size's slope over each. With a size of each rover's, it is at
+    least what these scatter by. `fit` is of the equations `beside` what single recordings show.
+    """
+    span, count = fit.spans[index], len(fit.terms[index].group.columns)
+    values = fit.coefficients[span]
+    step = SLOPE_STEP * max(float(np.max(np.abs(values))), 1e-300)
+    slopes = np.zeros((1, len(fit.coefficients)))
+    for place in np.arange(len(fit.coefficients))[span]:
+        moved = [fit.coefficients.copy(), fit.coefficients.copy()]
+        moved[0][place] -= step
+        moved[1][place] += step
+        less, more = (relative_size(equations, replace(fit, coefficients=each), index, 0.0) for each in moved)
+        slopes[0, place] = (more - less) / (2 * step)
+    size, std = relative_size(equations, fit, index, 0.0), float(size_stds(beside, fit, slopes)[0])
+    for name in () if fit.terms[index].group.of_wheels else _free(fit.terms[index].group):
+        if (found := moved_law(beside, fit, index, name)) is not None:
+            near = _nearest(beside, fit, index, name)[0]
+            terms = (*fit.terms[:index], replace(fit.terms[index], group=near), *fit.terms[index + 1 :])
+            by_shape = relative_size(equations, beside.fit(terms), index, 0.0) - size
+            step = float(near.shape[name]) - float(fit.terms[index].group.shape[name])
+            std = float(np.hypot(std, by_shape / step * found[1]))
+    of_rovers = np.linalg.norm(values.reshape(-1, count), axis=1)
+    scatter = float(np.std(of_rovers) / max(np.mean(of_rovers), 1e-300)) if fit.terms[index].units.each else 0.0
+    return size, float(_as_a_whole(np.array(size), np.array(max(std, scatter * size))))
 
 
 def told_sizes(group: GridGroup, values: Array, stds: Array) -> tuple[Array, Array]:
@@ -109,23 +141,32 @@ def moved_law(equations: FleetEquations, fit: FleetFit, index: int, name: str) -
     """Return the law with a free shape parameter where the recordings have it, and its standard deviation.
 
     An effect of two shapes s and s', of sizes c and d, is to first order one of the shape s + (s' − s) d / (c + d) and
-    of the size c + d. Of all shapes of the grid that differ in this parameter alone, that is taken which explains most
-    beside the fit's own; None where there is none.
+    of the size c + d. Of the shapes of the grid that differ in this parameter alone, that is taken of the nearest on
+    either side which explains more beside the fit's own; None where there is none.
     """
-    term = fit.terms[index]
-    others = [group for group in equations.groups if _differs_in(group, term.group, name)]
-    if not others:
+    term, nearest = fit.terms[index], _nearest(equations, fit, index, name)
+    if not nearest:
         return None
-    both = max((equations.fit((*fit.terms, replace(term, group=each))) for each in others), key=_gained)
-    at, other = term.group.shape, both.terms[-1].group.shape
-    scale = _scale(term.group.candidate, other) / _scale(term.group.candidate, at)
+    both = max((equations.fit((*fit.terms, replace(term, group=each))) for each in nearest), key=_gained)
+    own, other = term.group.shape, both.terms[-1].group.shape
+    scale = _scale(term.group.candidate, other) / _scale(term.group.candidate, own)
     total = both.coefficients[both.spans[index]] + scale * both.coefficients[both.spans[-1]]
     energy = max(float(total @ total), 1e-300)
     share = scale * float(both.coefficients[both.spans[-1]] @ total) / energy
     stds = size_stds(equations, both, _along(both, index, total / energy, share, scale))
-    step = float(other[name]) - float(at[name])
+    at = float(own[name])
+    step = float(other[name]) - at
     sizes = mean_sizes(total, stds[1:], len(term.group.columns))
-    return Law({**at, name: float(at[name]) + share * step}, *sizes), abs(step) * float(stds[0])
+    return Law({**own, name: at + share * step}, *sizes), abs(step) * float(stds[0])
+
+
+def _nearest(equations: FleetEquations, fit: FleetFit, index: int, name: str) -> list[GridGroup]:
+    """Return the nearest shape of the grid on either side that differs from a term's in one parameter alone."""
+    term = fit.terms[index]
+    others = [group for group in equations.groups if _differs_in(group, term.group, name)]
+    at = float(term.group.shape[name]) if others else 0.0
+    sides = ([each for each in others if (float(each.shape[name]) > at) is above] for above in (False, True))
+    return [min(side, key=lambda each: abs(float(each.shape[name]) - at)) for side in sides if side]
 
 
 def _along(both: FleetFit, index: int, total: Array, share: float, scale: float) -> Array:

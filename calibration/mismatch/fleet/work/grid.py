@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.responses import strongest
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.fleet.work.found import Found
@@ -23,6 +23,8 @@ MOST_FOUND_SHAPES = 6
 """Shapes that were found in single recordings, of one candidate (a choice)."""
 MOST_RESPONSES = 5
 """Responses of all recordings of which the shapes are tried (a choice: the factor of a sine has four kinds)."""
+NEAR = 0.1
+"""Share by which shapes about a chosen one differ from it in a number (a choice: a law is linear over so little)."""
 AT_ONCE = "onset_s"
 """The shape parameter of what begins within a recording. Over a fleet it is there from its first instant."""
 
@@ -77,6 +79,35 @@ def grid_of(
     return tuple(groups)
 
 
+def finer_grid(grid: Sequence[GridGroup], chosen: Sequence[GridGroup], found: Sequence[Found]) -> tuple[GridGroup, ...]:
+    """Return the groups with more shapes of the candidates that were chosen, the same where there are none.
+
+    These are all of the grid that the first shapes were taken from, and such as differ from the chosen one by little in
+    each number: a law in a wrong shape leaves what another law takes up.
+    """
+    shapes_of: dict[str, list[Shape]] = {}
+    for group in grid:
+        shapes_of.setdefault(group.candidate.name, []).append(group.shape)
+    more: list[GridGroup] = []
+    for group in chosen:
+        known = shapes_of[group.candidate.name]
+        for shape in () if group.begins else (*_widest(group.candidate, found), *_near(group)):
+            if shape not in known:
+                known.append(shape)
+                more.append(replace(group, shape=shape))
+    return (*grid, *more)
+
+
+def _near(group: GridGroup) -> Iterator[Shape]:
+    """Yield the shapes that differ from a group's by little in one free number, on either side."""
+    for name, (low, high) in group.candidate.free.items():
+        value = group.shape.get(name)
+        if isinstance(value, float) and value and name != group.candidate.change_point:
+            for share in (1 - NEAR, 1 + NEAR):
+                if low <= (near := value * share) <= high:
+                    yield {**group.shape, name: near}
+
+
 def _shapes_by_response(
     candidate: Candidate, found: Sequence[Found], rovers: Sequence[str]
 ) -> tuple[tuple[Shape, ...], int]:
@@ -107,8 +138,7 @@ def placed(grid: Sequence[GridGroup], sums: Sequence[Sums], first: int) -> tuple
 
 def shapes_over_fleet(candidate: Candidate, found: Sequence[Found]) -> tuple[Shape, ...]:
     """Return a candidate's shapes for all recordings; of what begins at some time, the shape after that alone."""
-    grids = [each.shapes[candidate.name] for each in found if candidate.name in each.shapes]
-    widest = max(grids, key=lambda grid: (grid.reach, len(grid.shapes))).shapes if grids else ()
+    widest = _widest(candidate, found)
     if not widest:
         return ()
     change_point = candidate.change_point
@@ -118,3 +148,9 @@ def shapes_over_fleet(candidate: Candidate, found: Sequence[Found]) -> tuple[Sha
     named = [term.shape for each in found for term in each.terms if term.named and term.name == candidate.name]
     more = {repr(sorted(shape.items())): shape for shape in named if shape not in kept}
     return (*kept, *list(more.values())[:MOST_FOUND_SHAPES])
+
+
+def _widest(candidate: Candidate, found: Sequence[Found]) -> tuple[Shape, ...]:
+    """Return a candidate's whole grid in the recording in which its covariate reaches furthest."""
+    grids = [each.shapes[candidate.name] for each in found if candidate.name in each.shapes]
+    return tuple(max(grids, key=lambda grid: (grid.reach, len(grid.shapes))).shapes) if grids else ()
