@@ -307,7 +307,8 @@ def _of_channel(
     chooser, results = searched.chooser, searched.found
     fit = earned(chooser, searched.fit, results)
     chooser = replace(chooser, equations=with_released(chooser.equations, fit, results, simulation.parameters))
-    return Chosen(chooser, chooser.equations.fit(fit.terms), searched.names, results, simulation)
+    fit = earned(chooser, chooser.equations.fit(fit.terms), results)  # a released parameter may act as a name does
+    return Chosen(chooser, fit, searched.names, results, simulation)
 
 
 class _Searched(NamedTuple):

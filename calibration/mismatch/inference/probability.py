@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import OtherAnswer
-from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN
-from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
+from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN, with_refused
+from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED, answer_names
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -79,6 +79,21 @@ def probability_of_others(
     """Return the share of each other answer."""
     relative = _relative(others, thresholds)
     return np.asarray(thresholds.highest_probability * relative / (1 + relative.sum()))
+
+
+def leads_of(decision: Decision) -> list[float]:
+    """Return by how much an answer is ahead of itself without each of its terms, by the evidence, in Δχ².
+
+    Infinite where the answer without it is none that comes near, and where the evidence did not decide.
+    """
+    terms = decision.whole.terms
+    told = set(answer_names(terms))
+    others = with_refused(decision) if told and decided_by_evidence(decision) else ()
+    less = [(set(other.effects), other.margin) for other in others if is_known(decision, others)]
+    return [
+        min((margin for names, margin in less if names <= told - set(answer_names([term]))), default=np.inf)
+        for term in terms
+    ]
 
 
 def _relative(others: Sequence[Alternative], thresholds: Thresholds) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -1,7 +1,8 @@
 """What single recordings show beside the effects of the fleet.
 
 A finding of one recording counts if it gains more than was asked of it there, with the fleet's effects in place, and
-pays for having been found in one of many recordings. The same curve in several recordings of a rover pays once.
+pays for having been found in one of many recordings; so does its lead over nothing in the recording's own answer, which
+knows how slow its noise is. The same curve in several recordings of a rover pays once.
 """
 
 from __future__ import annotations
@@ -52,20 +53,24 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
         if not _is_of_the_fleet(equations, fit, i, term)
     }
     ahead = {(i, k): gain - found[i].terms[k].penalty for (i, k), gain in gains.items()}
-    together = dict[object, float]()
+    together, leads = dict[object, float](), dict[object, float]()
     for (i, k), score in ahead.items():
         if not found[i].terms[k].named:
             curve = _curve_of(equations, i, found[i].terms[k])
             together[curve] = together.get(curve, 0.0) + max(score, 0.0)
+            leads[curve] = leads.get(curve, 0.0) + max(found[i].terms[k].lead, 0.0)
     effects, rest, own, curves = [], [], [], []
     for (i, k), score in ahead.items():
         term, findings = found[i].terms[k], found[i].findings
         here = gains[i, k] > THRESHOLDS.smooth_term_entry
-        if term.named and here and score > found[i].entry_threshold + chance:
+        if term.named and here and score > found[i].entry_threshold + chance and term.lead > chance:
             own.append((i, k))
             effects += [(i, each) for each in findings.effects if each.name == term.name][:1]
-        significant = together.get(_curve_of(equations, i, term), 0.0) > THRESHOLDS.smooth_term_entry + chance
-        if not term.named and score > 0 and significant:
+        if term.named:
+            continue
+        curve = _curve_of(equations, i, term)
+        significant = together[curve] > THRESHOLDS.smooth_term_entry + chance and leads[curve] > chance
+        if significant and score > 0:
             own.append((i, k))
             curves.append((i, k))
             place = k - sum(each.named for each in found[i].terms)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
 from regolithd.calibration.mismatch.inference.findings import noise_floor
+from regolithd.calibration.mismatch.inference.probability import leads_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
@@ -45,6 +47,7 @@ class FoundTerm:
     penalty: what it had to gain, in Δχ²
     columns: shape (column, time, wheel), 0 on other wheels and where nothing is compared
     coupling: of a smooth term, how it acts
+    lead: of the recording's own answer over the same without it, by the evidence, in Δχ²; infinite where that is none
     """
 
     name: str
@@ -54,6 +57,7 @@ class FoundTerm:
     penalty: float
     columns: Single
     coupling: str = ""
+    lead: float = inf
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,9 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         autocorrelation_times=decision.noise.autocorrelation_times,
         noise_floor=noise_floor(decision),
         entry_threshold=decision.entry_threshold,
-        terms=tuple(_found_term(decision, term) for term in whole.terms),
+        terms=tuple(
+            _found_term(decision, term, lead) for term, lead in zip(whole.terms, leads_of(decision), strict=True)
+        ),
         shapes=shapes_in(problem, of_recording.candidates),
         labels=dict(problem.labels),
         late_inputs=dict(problem.on_time),
@@ -158,7 +164,7 @@ def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str,
     return found
 
 
-def _found_term(decision: Decision, term: Term) -> FoundTerm:
+def _found_term(decision: Decision, term: Term, lead: float) -> FoundTerm:
     equations = decision.equations
     design = equations.design
     columns = design.in_time(design.columns_as_read(term.group.columns)).astype(np.float32)
@@ -171,6 +177,7 @@ def _found_term(decision: Decision, term: Term) -> FoundTerm:
         penalty=equations.penalty(term),
         columns=columns,
         coupling=term.group.coupling,
+        lead=lead,
     )
 
 
