@@ -32,7 +32,6 @@ class Chooser:
     equations: of the fleet
     places: sets of units and courses
     entry_threshold: score that a term must bring
-    used: whether each recording is fitted, shape (recording,); None: all
     """
 
     equations: FleetEquations

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
+from regolithd.calibration.mismatch.inference import probability as module
 from regolithd.calibration.mismatch.inference.alternatives import (
     Alternative,
     alternatives,
@@ -17,6 +18,7 @@ from regolithd.calibration.mismatch.inference.alternatives import (
 from regolithd.calibration.mismatch.inference.probability import (
     decided_by_evidence,
     is_known,
+    leads_of,
     other_answers,
     probability,
 )
@@ -152,3 +154,22 @@ def test_an_answer_is_no_more_probable_than_one_that_held_out_readings_refused()
     assert probability(with_refused(nothing), THRESHOLDS) <= 0.5 * HIGHEST
     weaker = replace(found, refused=frozenset({frozenset(alternatives(found)[0].effects)}))
     assert with_refused(weaker)[0].margin == alternatives(found)[0].margin
+
+
+def test_the_lead_of_a_term_is_over_the_answer_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over the best of those that have nothing else; other names, and more of them, are no answer without it."""
+    decision = decided(drag=0.3)
+    (name,) = (term.name for term in decision.whole.terms)
+    others = (Alternative(("other",), 1.0), Alternative((name, "other"), 2.0), Alternative((), 5.0))
+    monkeypatch.setattr(module, "with_refused", lambda _: others)
+    assert leads_of(decision) == [5.0]
+    monkeypatch.setattr(module, "with_refused", lambda _: others[:2])
+    assert leads_of(decision) == [np.inf]
+    monkeypatch.setattr(module, "is_known", lambda *_: False)
+    monkeypatch.setattr(module, "with_refused", lambda _: others)
+    assert leads_of(decision) == [np.inf]
+
+
+def test_nothing_has_no_leads() -> None:
+    """No answer is asked for."""
+    assert leads_of(decided()) == []

@@ -139,3 +139,23 @@ def test_the_same_curve_in_several_recordings_of_a_rover_is_judged_together(
     couplings = ("drag", coupling, "drag")
     terms = [replace(shown("voltage", named=False, penalty=costs[n]), coupling=couplings[n]) for n in range(3)]
     assert shown_beside(of, fit, [found(each) for each in terms]).curves == told
+
+
+@pytest.mark.parametrize("margin", [-0.01, 0.01])
+@pytest.mark.parametrize("named", [True, False])
+def test_the_recording_s_own_lead_pays_for_the_choice_among_recordings(named: bool, margin: float) -> None:
+    """However much it gains beside the fleet: the recording's own answer knows how slow its noise is."""
+    of = with_own(drive(1, on_both(OWN, 0.2)))
+    lead = 2 * float(np.log(3)) + margin
+    one = replace(shown("viscous-friction" if named else "load", named=named), lead=lead)
+    assert bool(shown_beside(of, of.fit(()), [found(), found(one), found()]).terms) == (margin > 0)
+
+
+def test_leads_of_the_same_curve_add_up() -> None:
+    """Of two recordings of one rover; each alone is behind."""
+    both = [drive(n, on_both(OWN, 0.2)) for n in (1, 2)]
+    sums = [drive(0).sums(), *(replace(each.sums(), own=((OWN,),)) for each in both)]
+    of = fleet_equations(sums, (0,) * 3, (0.0, 1.0, 2.0), GROUPS, "rover")
+    curve = replace(shown("load", named=False), lead=1.2)
+    assert shown_beside(of, of.fit(()), [found(), found(curve), found(curve)]).curves == ((1, 0), (2, 0))
+    assert not shown_beside(of, of.fit(()), [found(), found(curve), found(replace(curve, lead=0.9))]).curves

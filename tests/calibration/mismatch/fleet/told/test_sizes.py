@@ -12,7 +12,8 @@ from synthetic_fleet import GROUPS, WAVE, Drag, drive, term
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
-from regolithd.calibration.mismatch.fleet.told.sizes import moved_law, parameters_of
+from regolithd.calibration.mismatch.fleet.choice.selection import relative_size
+from regolithd.calibration.mismatch.fleet.told.sizes import moved_law, parameters_of, size_with_std
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -97,3 +98,37 @@ def test_a_number_of_which_the_grid_has_usual_values_alone_has_no_interval() -> 
     found = told(of, of.fit((term(groups[0], Course("always")),)))
     assert found["exponent"].value == 1.0
     assert np.isnan([found["exponent"].low, found["exponent"].high]).all()
+
+
+def test_the_interval_of_a_size_is_not_wider_for_a_coefficient_near_0() -> None:
+    """A wave with a sine alone is known as well as its sine, though its cosine may be anything about 0."""
+    drives = [drive(n, {(3, 0): 0.3, (3, 1): 0.3}) for n in range(6)]
+    of = fleet_equations([each.sums() for each in drives], (0,) * 6, range(6), GROUPS, "rover")
+    fit = of.fit((term(WAVE, Course("always")),))
+    size, std = size_with_std(of, of, fit, 0)
+    sine, cosine = fit.coefficients[fit.spans[0]]
+    assert abs(cosine) < 0.03 * sine
+    of_sine = float(size_stds(of, fit)[fit.spans[0]][0]) / sine
+    assert std / size == pytest.approx(np.hypot(of_sine, THRESHOLDS.size_discrepancy_std), rel=0.02)
+
+
+def test_the_interval_of_a_size_holds_what_its_shape_leaves_open() -> None:
+    """The size at the other shape is as far away as the shape's own standard deviation says."""
+    of, fit = season()
+    size, std = size_with_std(of, of, fit, 0)
+    alone = size_with_std(*[season(alone=True)[0]] * 2, season(alone=True)[1], 0)
+    other = of.fit((term(of.groups[1], Course("always")),))
+    _, of_power = moved_law(of, fit, 0, "power") or pytest.fail("no other shape")
+    moved = (relative_size(of, other, 0, 0.0) - size) / 0.25 * of_power
+    assert alone[0] == pytest.approx(size)
+    assert std == pytest.approx(np.hypot(alone[1], moved), rel=0.02)
+
+
+def test_a_size_of_each_rover_s_scatters_as_they_do() -> None:
+    """Twice as large on one rover as on the other."""
+    drives = [drive(n, {(1, 0): size, (1, 1): size}) for n, size in enumerate((0.2, 0.2, 0.4, 0.4))]
+    of = fleet_equations([each.sums() for each in drives], (0, 0, 1, 1), range(4), GROUPS, "rover")
+    both = term(GROUPS[0], Course("always"), rovers=(0, 1))
+    fit = of.fit((replace(both, units=replace(both.units, each=True)),))
+    size, std = size_with_std(of, of, fit, 0)
+    assert std / size == pytest.approx(1 / 3, abs=0.05)

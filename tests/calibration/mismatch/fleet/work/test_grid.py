@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from sample_answer import FINDINGS
@@ -12,6 +13,7 @@ from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Sh
 from regolithd.calibration.mismatch.fleet.work.grid import (
     MOST_FOUND_SHAPES,
     MOST_SHAPES,
+    finer_grid,
     grid_of,
     placed,
     shapes_over_fleet,
@@ -102,3 +104,29 @@ def test_a_group_has_as_many_columns_as_recordings_have_of_it() -> None:
     groups = placed(grid, sums, 1)
     assert [group.columns for group in groups] == [(1, 2, 3), (4,), (5, 6)]
     assert [group.signs for group in groups] == [(1, 0, 0), (1,), (0, 0)]
+
+
+class Stretched(Drag):
+    """A drag with a power that is free, and a number that is not."""
+
+    free: ClassVar = {"power": (0.0, 10.5)}
+
+
+def test_a_finer_grid_has_all_shapes_of_what_was_chosen_and_such_near_to_it() -> None:
+    """Of the others none; a tenth less and more, as far as the bounds allow; columns and prices stay as they were."""
+    grids = [found(steady_drag=Shapes(1.0, powers(11)), wave=Shapes(1.0, powers(11)))]
+    grid = grid_of((Stretched(), Wave()), grids, 3)
+    chosen = [group for group in grid if group.candidate.name == "steady-drag" and group.shape["power"] == 10]
+    more = finer_grid(grid, [replace(each, shape={"power": 10.0, "kind": 1.0}) for each in chosen], grids)
+    assert more[: len(grid)] == grid
+    shapes = [group.shape for group in more[len(grid) :]]
+    assert shapes == [*({"power": power} for power in (1, 3, 5, 7, 9)), {"power": 9.0, "kind": 1.0}]
+    assert {(group.candidate.name, group.tried) for group in more[len(grid) :]} == {("steady-drag", grid[0].tried)}
+
+
+def test_a_grid_is_no_finer_for_what_has_one_shape_or_begins() -> None:
+    """Nor where nothing was chosen."""
+    grids = [found(steady_drag=Shapes(1.0, ({},)), wear=Shapes(0.0, tuple({"onset_s": float(n)} for n in range(9))))]
+    grid = grid_of((Drag(), Wear()), grids, 1)
+    assert finer_grid(grid, grid, grids) == grid
+    assert finer_grid(grid, (), grids) == grid
