@@ -33,6 +33,7 @@ from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_f
 from regolithd.calibration.mismatch.inference.other_covariates import (
     notes_on_a_curve_in_place,
     notes_on_other_covariates,
+    notes_on_ways_to_act,
 )
 from regolithd.calibration.mismatch.inference.own_values import far_enough, notes_on_own_values, own_values
 from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
@@ -120,6 +121,7 @@ def findings_of(
             *decision.notes,
             *notes_on_confined_laws(decision, places),
             *notes_on_other_covariates(decision),
+            *notes_on_ways_to_act(decision),
             *notes_on_dynamics(decision),
         ),
         notes_on_recording=(

@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURV
 from regolithd.calibration.mismatch.regression.smooth_groups import same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
+from regolithd.calibration.mismatch.selection.law_misfit import is_of_the_prediction
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,6 +50,45 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     note = f"What is unexplained over the {here} follows the {there} nearly as well"
     why = "they go together in this recording, or it hardly depends on any of them"
     return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)
+
+
+WAYS = {
+    "gain": "a share of the prediction",
+    "drag": "a drag along the motion, whatever the prediction",
+    "offset": "an offset, whatever the prediction and the motion",
+}
+"""What a curve may be by its coupling."""
+
+
+def notes_on_ways_to_act(decision: Decision) -> tuple[str, ...]:
+    """Return a note where the one curve acts in another way as probably, over the same covariate and wheels.
+
+    In a recording at one load a share of the prediction and a drag are the same; in another they are not. Over the
+    prediction itself they are one.
+    """
+    if len(decision.unnamed) != 1 or decision.intermittent or decision.unnamed[0].group.coupling not in WAYS:
+        return ()
+    told, limits = decision.unnamed[0], decision.equations.thresholds
+    if is_of_the_prediction(decision.equations.problem, told):
+        return ()
+    scores = {
+        term.group.coupling: score
+        for score, term in best_of_each_smooth_term(decision.equations, decision.named.terms)
+        if (term.name, term.wheels) == (told.name, told.wheels) and term.group.coupling in WAYS
+    }
+    least = scores.get(told.group.coupling, float("inf")) - limits.lead_margin
+    others = [
+        WAYS[coupling] for coupling, score in scores.items() if coupling != told.group.coupling and score >= least
+    ]
+    if not others:
+        return ()
+    here = word_for(told.name, decision.equations.problem.labels)
+    note = (
+        f"Whether what is unexplained over the {here} is {WAYS[told.group.coupling]} or {' or '.join(others)}, this "
+        "recording does not tell: a corrected simulation has it as the first. The prediction has to vary at the same "
+        f"{here} to tell."
+    )
+    return (note,)
 
 
 def notes_on_a_curve_in_place(decision: Decision, others: Sequence[Alternative]) -> tuple[str, ...]:

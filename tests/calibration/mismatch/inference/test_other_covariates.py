@@ -66,3 +66,35 @@ def test_what_follows_a_covariate_that_changes_slowly_is_told_over_that(period_s
     found = compare(from_columns({"t_s": t_s, "flow_l_s": flow, "pressure_kPa": pressure, "power_W": power}), Pump())
     assert [each.covariate for each in found.answer.unexplained] == ["pressure"]
     assert any("over the pressure follows the time nearly as well" in note for note in found.answer.notes)
+
+
+class Stirrer(Simulation):
+    """A motor whose current follows the load; the speed of a second one is recorded too."""
+
+    channel, unit = "current_A", "A"
+    inputs = ("load_N", "stirrer_rpm")
+    parameters: ClassVar = {"A_per_N": Prior(0.05, 0.002, "A/N")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return current in proportion to the load."""
+        return values["A_per_N"] * inputs["load_N"]
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return the second motor's speed."""
+        return {"stirrer": inputs["stirrer_rpm"]}
+
+
+@pytest.mark.parametrize(("varied", "told"), [(0.0, True), (0.4, False)])
+def test_a_curve_says_where_it_may_be_a_share_or_an_offset(varied: float, told: bool) -> None:
+    """At one load these are the same; where the load varies at the same speed, the recording tells."""
+    rng = np.random.default_rng(2)
+    t_s = np.arange(2 * INSTANTS) * 0.5
+    load = 100.0 * (1.0 + varied * np.sin(t_s / 13))
+    rpm = 20.0 + 10.0 * np.sin(t_s / 41)
+    current = 0.05 * load + 1.0 * np.exp(-0.5 * ((rpm - 18.0) / 3.0) ** 2) + rng.normal(0, 0.15, len(t_s))
+    columns = {"t_s": t_s, "current_A": current, "load_N": load, "stirrer_rpm": rpm}
+    found = compare(from_columns(columns), Stirrer()).answer
+    assert [each.covariate for each in found.unexplained] == ["stirrer"]
+    about = [note for note in found.notes if note.startswith("Whether what is unexplained over the stirrer is ")]
+    assert bool(about) is told
+    assert all("a share of the prediction" in note and "an offset" in note for note in about)
