@@ -70,13 +70,15 @@ def size_with_std(equations: FleetEquations, beside: FleetEquations, fit: FleetF
         less, more = (relative_size(equations, replace(fit, coefficients=each), index, 0.0) for each in moved)
         slopes[0, place] = (more - less) / (2 * step)
     size, std = relative_size(equations, fit, index, 0.0), float(size_stds(beside, fit, slopes)[0])
-    for name in () if fit.terms[index].group.of_wheels else _free(fit.terms[index].group):
+    group = fit.terms[index].group
+    for name in () if group.of_wheels else _free(group):
         if (found := moved_law(beside, fit, index, name)) is not None:
             near = _nearest(beside, fit, index, name)[0]
             terms = (*fit.terms[:index], replace(fit.terms[index], group=near), *fit.terms[index + 1 :])
             by_shape = relative_size(equations, beside.fit(terms), index, 0.0) - size
-            step = float(near.shape[name]) - float(fit.terms[index].group.shape[name])
-            std = float(np.hypot(std, by_shape / step * found[1]))
+            low, high = group.candidate.free[name]
+            of_shape = min(found[1], (high - low) / np.sqrt(12))  # at most as of any value within the bounds
+            std = float(np.hypot(std, by_shape / (float(near.shape[name]) - float(group.shape[name])) * of_shape))
     of_rovers = np.linalg.norm(values.reshape(-1, count), axis=1)
     scatter = float(np.std(of_rovers) / max(np.mean(of_rovers), 1e-300)) if fit.terms[index].units.each else 0.0
     return size, float(_as_a_whole(np.array(size), np.array(max(std, scatter * size))))
