@@ -28,7 +28,10 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.prior import Prior
 
 BY_CHANCE = 1e-4
-"""Probability that channels contradict each other so much if nothing is left out in any."""
+"""Probability that channels contradict each other so much if nothing is left out in any (a choice: in 145 of 149 cases
+of strangers the Δχ² was below 12, where 26 to 32 are asked; in the four others something was left out)."""
+LEAST_STD = 1e-6
+"""Standard deviation of each parameter beside the others, in that of its prior, at least (double precision)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +62,8 @@ class Apart:
         order = np.argsort(self.others.stds, kind="stable")
         names = tuple(self.others.names[place] for place in order)
         stds, values = np.array([priors[name].std for name in names]), self.others.values(priors)
-        covariance = self.others.covariance[np.ix_(order, order)] * np.outer(stds, stds)
-        return KnownTogether.of(names, np.array([values[name] for name in names]), covariance)
+        covariance = self.others.covariance[np.ix_(order, order)] + LEAST_STD**2 * np.eye(len(order))
+        return KnownTogether.of(names, np.array([values[name] for name in names]), covariance * np.outer(stds, stds))
 
 
 def contradictions(priors: Mapping[str, Prior], informations: Mapping[str, Information]) -> list[Apart]:

@@ -55,6 +55,18 @@ def test_one_channel_alone_contradicts_nothing() -> None:
     assert not contradictions(exact, {"force": seen(8.5, 1.0), "power": seen(10.0, 1.0)})
 
 
+def test_what_the_others_know_of_two_that_they_cannot_tell_apart_is_a_density() -> None:
+    """They know the sum alone, many thousand times as well as the priors do."""
+    matrix = np.full((2, 2), 1e9) * np.outer([1.0, 10.0], [1.0, 10.0])
+    others = Information(("a", "b"), matrix, matrix @ [10.0, 1.0], {})
+    found = contradictions(PRIORS, {"force": seen(8.0, 1.0), "power": others})
+    known = next(each for each in found if each.channel == "force").known(PRIORS)
+    assert np.isfinite(known.factor).all()
+    assert (np.diag(known.factor) > 0).all()
+    values = known.values(dict(zip(known.names, known.mean + np.array([0.3, 0.0]), strict=True)))
+    assert values["a"] / 10 + values["b"] == pytest.approx(2.0, abs=1e-4)
+
+
 class Fan(Simulation):
     """The pressure of a fan and the power of its motor."""
 
