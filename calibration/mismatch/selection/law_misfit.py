@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.problem.covariates import quantity
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
@@ -45,14 +46,22 @@ def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[T
 
     What an inexact law leaves is a function of its covariate: a further law over that, over the prediction, or of
     nothing (a constant, a delay) can hold it all. One over another covariate holds as much of it as of the law itself,
-    beside the parameters: a ripple over the angle hardly anything of a drag, a curve over the sun's azimuth hardly
-    anything of what a delay changes wherever the prediction does.
+    beside the parameters: a ripple over the angle hardly anything of a drag. A curve has knots enough to hold what laws
+    miss over covariates that go with its own, but for delays: these change something wherever the prediction does, of
+    which a curve over the sun's azimuth holds hardly anything.
     """
     over = {term.imitated_over for term in further}
     changed = any(term.group.is_change for term in names.terms)
     if changed or "none" in over or any(is_of_the_prediction(equations.problem, term) for term in further):
         return explained(equations, names)
-    partly = [index for index, term in enumerate(names.terms) if term.imitated_over not in over]
+    of_laws = all(term.group.named for term in further)
+    partly = [
+        index
+        for index, term in enumerate(names.terms)
+        if term.name == SensorDelay.name or (of_laws and term.imitated_over not in over)
+    ]
+    if not partly:
+        return explained(equations, names)
     others = equations.fit([term for index, term in enumerate(names.terms) if index not in partly])
     by_these = names.delta_chi2 - others.delta_chi2
     size = np.zeros(len(names.columns))
