@@ -63,12 +63,15 @@ class KnownTogether:
 
         Parameters
         ----------
-        names: of matrix and vector
+        names: of matrix and vector; a parameter that is none of the known ones stands for itself
         matrix, vector: M and v of the log likelihood −½ uᵀ M u + vᵀ u, of what stands in the parameters' place
         """
-        places = [self.names.index(name) for name in names]
-        back = np.linalg.inv(self._mixed())[np.ix_(places, places)]
-        at, moved = self.mean[places], back.T @ matrix @ back
+        own = [row for row, name in enumerate(names) if name in self.names]
+        of = [self.names.index(names[row]) for row in own]
+        back, at = np.eye(len(names)), np.zeros(len(names))
+        back[np.ix_(own, own)] = np.linalg.inv(self._mixed())[np.ix_(of, of)]
+        at[own] = self.mean[of]
+        moved = back.T @ matrix @ back
         return moved, back.T @ (vector - matrix @ at) + moved @ at
 
     def _mixed(self) -> Array:

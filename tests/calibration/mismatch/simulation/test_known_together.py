@@ -56,3 +56,15 @@ def test_what_readings_know_is_told_of_the_parameters(known: KnownTogether) -> N
     there = difference(np.array([4.5, 9.0]))
     assert difference(np.array([4.7, 8.6])) == pytest.approx(there)
     assert difference(np.array([3.0, 12.0])) == pytest.approx(there)
+
+
+def test_a_parameter_that_is_not_known_together_stands_for_itself(known: KnownTogether) -> None:
+    """As one that another channel holds at a bound; what is known of the others is as without it."""
+    names, matrix, vector = ("glide", "mass", "area"), np.diag([50.0, 2.0, 30.0]), np.array([260.0, 44.0, 310.0])
+    moved, along = known.information(names, matrix, vector)
+    at = [0, 2]
+    alone = known.information(("glide", "area"), matrix[np.ix_(at, at)], vector[at])
+    np.testing.assert_allclose(moved[np.ix_(at, at)], alone[0])
+    np.testing.assert_allclose(along[at], alone[1])
+    np.testing.assert_allclose(moved[1], [0.0, 2.0, 0.0])
+    assert along[1] == pytest.approx(44.0)
