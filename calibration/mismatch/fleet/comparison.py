@@ -303,6 +303,7 @@ def _of_channel(
     searched = compared.searched(grid, load, channel, level, work)
     finer = finer_grid(grid, [term.group for term in searched.fit.terms], compared.found)
     if len(finer) > len(grid):
+        del searched  # memory holds the sums of one search at a time
         searched = compared.searched(finer, load, channel, level, work)
     chooser, results = searched.chooser, searched.found
     fit = earned(chooser, searched.fit, results)

@@ -14,7 +14,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.answer import OtherAnswer
 from regolithd.calibration.mismatch.inference.joint_parameters import Likelihood, joint_posterior
-from regolithd.calibration.mismatch.inference.probability import TOLD
+from regolithd.calibration.mismatch.inference.probability import TOLD, relative
 from regolithd.calibration.mismatch.inference.several_channels import told_names
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.simulation.known_together import KnownTogether
@@ -110,10 +110,9 @@ def told_apart(apart: Sequence[tuple[Apart, Answer]], channels: Sequence[str]) -
         with parameters as the others have them
     channels: all
     """
-    evidence = np.array([each.evidence for each, _ in apart])
-    shares = np.exp((evidence - evidence[0]) / THRESHOLDS.evidence_scale)
-    shares /= shares.sum()
     (first, answer), *rest = apart
+    shares = relative([first.evidence - each.evidence for each, _ in apart], THRESHOLDS)
+    shares /= shares.sum()
     others = tuple(
         OtherAnswer(told_names(other), bool(other.unexplained), float(share) * (other.probability or 0.0))
         for (_, other), share in zip(rest, shares[1:], strict=True)

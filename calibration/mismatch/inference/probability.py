@@ -56,7 +56,7 @@ def is_known(decision: Decision, others: Sequence[Alternative]) -> bool:
 
 def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:
     """Return the share of the given answer, whose margin to itself is 0."""
-    return thresholds.highest_probability / (1 + float(np.sum(_relative(others, thresholds))))
+    return thresholds.highest_probability / (1 + float(np.sum(relative([each.margin for each in others], thresholds))))
 
 
 def other_answers(others: Sequence[Alternative], thresholds: Thresholds) -> tuple[OtherAnswer, ...]:
@@ -77,8 +77,8 @@ def probability_of_others(
     others: Sequence[Alternative], thresholds: Thresholds
 ) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Return the share of each other answer."""
-    relative = _relative(others, thresholds)
-    return np.asarray(thresholds.highest_probability * relative / (1 + relative.sum()))
+    of_each = relative([each.margin for each in others], thresholds)
+    return np.asarray(thresholds.highest_probability * of_each / (1 + of_each.sum()))
 
 
 def leads_of(decision: Decision) -> list[float]:
@@ -89,14 +89,14 @@ def leads_of(decision: Decision) -> list[float]:
     terms = decision.whole.terms
     told = set(answer_names(terms))
     others = with_refused(decision) if told and decided_by_evidence(decision) else ()
-    less = [(set(other.effects), other.margin) for other in others if is_known(decision, others)]
+    less = [(set(other.effects), other.margin) for other in others] if is_known(decision, others) else []
     return [
         min((margin for names, margin in less if names <= told - set(answer_names([term]))), default=np.inf)
         for term in terms
     ]
 
 
-def _relative(others: Sequence[Alternative], thresholds: Thresholds) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return how likely each alternative is against the given answer."""
-    margins = np.array([each.margin for each in others], np.float64)
-    return np.asarray(np.exp(-np.clip(margins, -LARGEST_MARGIN, LARGEST_MARGIN) / thresholds.evidence_scale))
+def relative(margins: Sequence[float], thresholds: Thresholds) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Return how likely answers are against the given one, by which its evidence is ahead of theirs (Δχ²)."""
+    ahead = np.clip(np.array(margins, np.float64), -LARGEST_MARGIN, LARGEST_MARGIN)
+    return np.asarray(np.exp(-ahead / thresholds.evidence_scale))

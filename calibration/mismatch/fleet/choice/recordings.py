@@ -62,11 +62,11 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
     effects, rest, own, curves = [], [], [], []
     for (i, k), score in ahead.items():
         term, findings = found[i].terms[k], found[i].findings
-        here = gains[i, k] > THRESHOLDS.smooth_term_entry
-        if term.named and here and score > found[i].entry_threshold + chance and term.lead > chance:
-            own.append((i, k))
-            effects += [(i, each) for each in findings.effects if each.name == term.name][:1]
         if term.named:
+            here = gains[i, k] > THRESHOLDS.smooth_term_entry
+            if here and score > found[i].entry_threshold + chance and term.lead > chance:
+                own.append((i, k))
+                effects += [(i, each) for each in findings.effects if each.name == term.name][:1]
             continue
         curve = _curve_of(equations, i, term)
         significant = together[curve] > THRESHOLDS.smooth_term_entry + chance and leads[curve] > chance
