@@ -209,7 +209,12 @@ def _equation(problem: Problem, curve: EmpiricalCurve, term: Term, found: Fitted
         form = f"({form}) + b" if "where" in form else f"{form} + b"
     text = X.sub(lambda _: x, form)
     factor = factor_in_words(curve.coupling, problem.simulation.channel)
-    return f"Δ{problem.simulation.channel} = " + (f"({text}) · {factor}" if factor else text)
+    return f"Δ{problem.simulation.channel} = " + (_times(text, factor) if factor else text)
+
+
+def _times(text: str, factor: str) -> str:
+    """Return a form as text times a factor; that of a constant needs no brackets."""
+    return f"{text} · {factor}" if text == "c" else f"({text}) · {factor}"
 
 
 def factor_in_words(coupling: str, channel: str) -> str:

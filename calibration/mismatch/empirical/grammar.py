@@ -1,8 +1,8 @@
 """The grammar of closed forms: functions of one covariate that occur in laws, each with at most two shape parameters.
 
 A form is a coefficient (two for a sine) times a function of the covariate x, with or without a constant beside it. It
-knows no machine: powers, an exponential, saturation, a bump, a threshold, a step and a sine are what laws of friction,
-fluids, magnets and contacts are made of near one working point.
+knows no machine: a constant, powers, an exponential, saturation, a bump, a threshold, a step and a sine are what laws
+of friction, fluids, magnets and contacts are made of near one working point.
 """
 
 from __future__ import annotations
@@ -106,7 +106,12 @@ class ClosedForm:
 
 def grammar() -> tuple[ClosedForm, ...]:
     """Return every form."""
-    return (*_powers(), *_bounded(), *_thresholds(), _sine())
+    return (_constant(), *_powers(), *_bounded(), *_thresholds(), _sine())
+
+
+def _constant() -> ClosedForm:
+    """Return a constant: of what acts in proportion to the prediction it is a share of that."""
+    return ClosedForm("constant", "c", lambda x, _: np.ones((1, len(x))))
 
 
 def _powers() -> list[ClosedForm]:

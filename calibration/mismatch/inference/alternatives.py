@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.regression.smooth_groups import is_constant
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
@@ -148,9 +149,13 @@ def _admissible(decision: Decision, fit: Fit) -> bool:
 
 
 def _enough_for_more_names(decision: Decision, fit: Fit) -> bool:
-    """Return whether a set gains what a further effect must, where it has the answer's effects and more."""
+    """Return whether a set gains what a further effect must, where it has the answer's effects and more.
+
+    Two names in the place of a curve are no further ones.
+    """
     extra = len(fit.terms) - len(decision.whole.terms)
     more = extra > 0 and all(term.group.named for term in fit.terms)
+    more = more and (bool(decision.named.terms) or not decision.unnamed)
     return not more or passes_entry_test(decision.equations, fit, decision.whole, decision.entry_threshold)
 
 
@@ -165,11 +170,12 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     """Return whether a curve gains no more than an inexact law leaves, beside a set's names or in the place of others.
 
     Where the answer's names leave nothing, and the set lacks some of them, the curve stands in their place. Alone, a
-    curve of their covariate always does; one in the place of several names of other covariates is no law's misfit.
+    curve of their covariate always does; one in the place of several names of other covariates is no law's misfit, nor
+    is a constant: it has nothing to follow another law with.
     """
     missing = [term for term in decision.named.terms if term.name not in answer_names(named.terms)]
     in_place = bool(missing) and not decision.unnamed
-    if _is_over_another_covariate(decision, fit):
+    if _is_over_another_covariate(decision, fit) or (in_place and is_constant(curve)):
         return False
     if in_place and not named.terms:
         of_its_covariate = all(term.imitated_over == curve.name for term in missing)
@@ -191,7 +197,9 @@ def _is_over_another_covariate(decision: Decision, fit: Fit) -> bool:
     if decision.unnamed or len(decision.named.terms) != 1 or len(fit.terms) != 1:
         return False
     (told,), (curve,) = decision.named.terms, fit.terms
-    if curve.group.named or curve.name in {"time", told.imitated_over} or curve.wheels != told.wheels:
+    if curve.group.named or is_constant(curve) or curve.name in {"time", told.imitated_over}:
+        return False
+    if curve.wheels != told.wheels:
         return False
     return law_misfit(decision.equations, decision.named, fit) < decision.equations.thresholds.form_misfit
 
@@ -261,7 +269,7 @@ def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
     """Yield the sets of terms with one less, one more, or one in another's place; of the names alone, too.
 
     A curve may hold what the wrong name beside it leaves: the right name needs none. And one curve may be what several
-    names imitate, or a name and another curve.
+    names imitate, or a name and another curve, or two names.
     """
     terms, named = decision.whole.terms, tuple(term for term in decision.whole.terms if term.group.named)
     if len(named) > 1:
@@ -271,6 +279,7 @@ def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
         yield from ((*rest, other) for other in _further(decision, rest))
     for _, name in best_of_each_candidate(decision.equations, ())[: TRIED_BESIDE_A_CURVE if not named else 0]:
         yield from ((name, curve) for _, curve in best_of_each_smooth_term(decision.equations, (name,))[:1])
+        yield from ((name, other) for _, other in best_of_each_candidate(decision.equations, (name,))[:1])
     yield from ((*terms, more) for more in _further(decision, terms))
     for index in range(len(terms)):
         rest = (*terms[:index], *terms[index + 1 :])

@@ -25,9 +25,15 @@ from regolithd.calibration.mismatch.selection.decision import Intermittent
 from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_gains_little
 from regolithd.calibration.mismatch.signal.jumps import jumps, levels
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
+from regolithd.calibration.mismatch.signal.means import block_means
 from regolithd.calibration.mismatch.signal.skewness import skewed_lengths
 from regolithd.calibration.mismatch.signal.spells import levelled_spells, skewed_spells, switching_spells
-from regolithd.calibration.mismatch.signal.switching_mean import FEWEST_PEERS, gain_as_noise, switching_mean
+from regolithd.calibration.mismatch.signal.switching_mean import (
+    FEWEST_PEERS,
+    block_lengths,
+    gain_as_noise,
+    switching_mean,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -60,6 +66,8 @@ class TimedSpells:
     acting: Array | None
 
 
+LEAST_IN_BLOCKS = 1 / 2
+"""Share of a curve's variance that its means over blocks have, from which on spells are a rival (a choice: most)."""
 CONSTANT = frozenset({"direction", "none"})
 """Covariates of effects of constant size."""
 
@@ -89,7 +97,8 @@ def _imitated_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
     """Return what shows spells without the curve over a covariate that gains less than they do, nothing where none is.
 
     Both gains are twice a log likelihood ratio to noise, as it acts along the motion or as read, less what the free
-    numbers cost. Where the covariate itself switches, it knows when, and its curve gains more.
+    numbers cost. Where the covariate itself switches, it knows when, and its curve gains more. Spells are looked for in
+    blocks of readings. A curve that changes from reading to reading hardly shows there, and imitates none.
     """
     curves = decision.unnamed
     if len(curves) != 1 or curves[0].name == "time" or curves[0].group.coupling in WITHOUT_CURVE:
@@ -103,7 +112,16 @@ def _imitated_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
     courses = zip(without, _as_it_acts(decision), strict=True)
     of_curve = max(before.gain_of(after, curve.wheels) for before, after in courses)
     of_curve -= decision.equations.thresholds.coefficient_penalty * len(curve.group.columns)
-    return found if of_spells > of_curve else {}
+    return found if of_spells > of_curve and _shows_in_blocks(decision, curve) else {}
+
+
+def _shows_in_blocks(decision: Decision, curve: Term) -> bool:
+    """Return whether means over the longest blocks in which spells are looked for have most of a curve's variance."""
+    equations, whole = decision.equations, decision.whole
+    acting = contribution(equations, whole, whole.terms.index(curve))
+    courses = [acting[equations.problem.mask[:, wheel], wheel] for wheel in curve.wheels]
+    in_blocks = sum(float(np.var(block_means(each, max(block_lengths(each))))) for each in courses)
+    return in_blocks > LEAST_IN_BLOCKS * sum(float(np.var(each)) for each in courses)
 
 
 def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:

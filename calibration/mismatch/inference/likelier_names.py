@@ -33,7 +33,8 @@ def likelier_names(decision: Decision) -> Decision | None:
         if UNEXPLAINED in other.effects:
             curve_for_all_names = other.effects == (UNEXPLAINED,)
             by_more_than_chance = other.margin < -chance and (UNEXPLAINED in told or curve_for_all_names)
-            likelier = told > set(other.effects) or by_more_than_chance
+            fewer = told > set(other.effects) and len(other.terms) < len(decision.whole.terms)
+            likelier = fewer or by_more_than_chance
             found = _with_curve(decision, other) if likelier else None
         else:
             fewer = bool(other.effects) and told > set(other.effects)

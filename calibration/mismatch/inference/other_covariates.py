@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.smooth_groups import same_covariate
+from regolithd.calibration.mismatch.regression.smooth_groups import is_constant, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
 from regolithd.calibration.mismatch.selection.law_misfit import is_of_the_prediction
@@ -33,7 +33,7 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     if len({term.name for term in decision.unnamed}) != 1 or decision.intermittent:
         return ()
     told, problem = decision.unnamed[0], decision.equations.problem
-    if told.group.coupling in WITHOUT_CURVE:
+    if told.group.coupling in WITHOUT_CURVE or is_constant(told):
         return ()
     scores = _scores_over(decision, told)
     most = scores.get(told.name, float("inf"))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.motion import along_motion
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.problem.covariates import quantity
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Sharing
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.group import Term
 
 Array = NDArray[np.float64]
 
@@ -60,6 +62,11 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
                 _ways_to_act(problem, name, couplings) if len(hats) >= FEWEST_KNOTS else ()
             ):
                 design = with_group(design, name, [hat * factor for hat in hats], coupling, sharing)
+    for name in ("torque", quantity(problem.simulation.channel)):
+        if problem.mask.shape[1] > 1 and name in problem.covariates and not problem.arbitrary_zero:
+            penalty = problem.thresholds.single_wheel_penalty
+            design = with_group(design, name, [couplings["gain"]], "gain", ("one",), penalty)
+            break
     speed = problem.covariates.get("wheel_speed")
     if speed is not None and np.nanmin(speed) < 0:
         # What acts one way only is neither a drag nor an offset.
@@ -124,6 +131,11 @@ def couplings_of(problem: Problem) -> dict[str, Array]:
 def _mean_prediction(problem: Problem) -> Array:
     """Return the mean of what is predicted of the compared readings of each wheel, 0 where none is compared."""
     return known_mean(np.where(problem.mask, problem.prediction, np.nan))
+
+
+def is_constant(term: Term) -> bool:
+    """Return whether a smooth term is one number: a constant share of the prediction."""
+    return not term.group.named and term.group.region is None and len(term.group.columns) == 1
 
 
 def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
+from regolithd.calibration.mismatch.regression.smooth_groups import is_constant
 from regolithd.calibration.mismatch.selection.causality import acts_forwards
 from regolithd.calibration.mismatch.selection.law_misfit import explained, explained_beside
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
@@ -341,10 +342,11 @@ def entry_cost(
 ) -> float:
     """Return what terms had to gain to enter: a threshold for each name, and one for each smooth term.
 
-    The latter is `smooth_term_entry` unless told.
+    The latter is `smooth_term_entry` unless told. A constant is one law, as a name is, and was not chosen among curves
+    over many covariates.
     """
     smooth = equations.thresholds.smooth_term_entry if of_smooth_term is None else of_smooth_term
-    return sum(entry_threshold if term.group.named else smooth for term in terms)
+    return sum(entry_threshold if term.group.named or is_constant(term) else smooth for term in terms)
 
 
 def wheels_of_faulty_sensors(fit: Fit) -> set[int]:

@@ -66,25 +66,30 @@ def without_confined_laws(decision: Decision) -> Decision:
     """Return the decision without names in whose place a law in a range is more probable, regions in their place.
 
     A curve that stood beside the name stays where it is significant beside the region. What comes and goes is in no
-    region.
+    region. Where a curve over the whole of the covariate is more probable than the law in a range, that takes the place
+    of the name.
     """
     if decision.intermittent:
         return decision
     while (found := _better_in_a_range(decision)) is not None:
         index, confined = found
         rest = decision.equations.fit(decision.named.without(index))
-        equations, whole = _with_region(decision.equations, rest, confined)
-        region, told = whole.terms[-1], tuple(each.region for each in decision.confined)
-        whole = equations.fit((*rest.terms, *told, region))
-        left = unexplained_beside(equations, whole)
-        unnamed = (*told, region) if left is None or left.name == region.name else (*told, region, left)
+        told = tuple(each.region for each in decision.confined)
+        if (curve := _better_everywhere(decision.equations, rest, confined)) is not None:
+            equations, place, laws = decision.equations, curve, decision.confined
+        else:
+            equations, whole = _with_region(decision.equations, rest, confined)
+            place = whole.terms[-1]
+            laws = (*decision.confined, ConfinedLaw(confined.law, place))
+        left = unexplained_beside(equations, equations.fit((*rest.terms, *told, place)))
+        unnamed = (*told, place) if left is None or left.name == place.name else (*told, place, left)
         decision = replace(
             decision,
             equations=equations,
             named=equations.fit(rest.terms),
             unnamed=unnamed,
             whole=equations.fit((*rest.terms, *unnamed)),
-            confined=(*decision.confined, ConfinedLaw(confined.law, region)),
+            confined=laws,
         )
     return decision
 
@@ -106,6 +111,18 @@ def _better_in_a_range(decision: Decision) -> tuple[int, Confined] | None:
             better = better and (best is None or confined.score > best[1].score)
             if better and _lead_in_slow_noise(decision, confined) > limits.slow_noise_entry:
                 best = index, confined
+    return best
+
+
+def _better_everywhere(equations: NormalEquations, rest: Fit, confined: Confined) -> Term | None:
+    """Return the curve over the covariate of a law in a range that scores more than that, if there is one."""
+    place = confined.region.covariate, confined.law.wheels
+    best, most = None, confined.score
+    for _, curve in best_of_each_smooth_term(equations, rest.terms):
+        if (curve.name, curve.wheels) != place or curve.group.coupling in WITHOUT_CURVE:
+            continue
+        score = equations.score(equations.fit((*rest.terms, curve))) - schwarz_surcharge(equations, rest, [curve])
+        best, most = (curve, score) if score > most else (best, most)
     return best
 
 

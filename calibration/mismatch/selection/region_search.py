@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURV
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.regression.region import FORMS, GROWTH, Region
 from regolithd.calibration.mismatch.regression.residuals import chi2_of
-from regolithd.calibration.mismatch.regression.smooth_groups import acting
+from regolithd.calibration.mismatch.regression.smooth_groups import acting, is_constant
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +44,7 @@ REFINED = 3
 """Ranges of one covariate whose bounds are refined (a choice: computing time)."""
 REFINED_PLACES, REFINEMENTS = 24, 2
 """Places of a bound about an edge, and how often the best is surrounded by finer ones (a choice: to 1 % of a step)."""
-EVERYWHERE = ((0, 1), (0, 1, 2), (0, 1, 2, 3))
+EVERYWHERE = ((0,), (0, 1), (0, 1, 2), (0, 1, 2, 3))
 """Powers of the simplest smooth laws that hold everywhere."""
 
 
@@ -106,10 +106,11 @@ def best_region(equations: NormalEquations, fit: Fit, forms: Forms) -> Found | N
 
 
 def significant_curves(equations: NormalEquations, fit: Fit) -> list[Term]:
-    """Return the best smooth term beside a fit for each covariate and coupling, best first."""
+    """Return the best smooth term beside a fit for each covariate and coupling, best first; a constant is none."""
     none = {"", *WITHOUT_CURVE}
     groups = [group for group in equations.design.groups if not group.named and group.coupling not in none]
-    scored = [(gain - equations.penalty(term), term) for gain, term in equations.further(fit.terms, groups)]
+    further = equations.further(fit.terms, groups)
+    scored = [(gain - equations.penalty(term), term) for gain, term in further if not is_constant(term)]
     best: dict[tuple[str, str], Term] = {}
     for score, term in sorted(scored, key=lambda pair: -pair[0]):
         if score > equations.thresholds.smooth_term_entry:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,23 +14,50 @@ OUTER_QUANTILES = (0.005, 0.995)
 FEWEST_KNOTS = 3
 
 
+@dataclass(frozen=True, eq=False)
+class Between:
+    """Between which knots the values of a covariate are.
+
+    Attributes
+    ----------
+    knots: number of knots
+    left: the knot to the left of each value, of the covariate's shape
+    right_share: what the hat function of the next one is there; that of the left one is 1 less this
+    """
+
+    knots: int
+    left: NDArray[np.int64]
+    right_share: Array
+
+    @classmethod
+    def of(cls, values: Array, known: NDArray[np.bool_], knots: int) -> Between | None:
+        """Return it for a covariate, None where the `known` values have fewer than three knots.
+
+        Knots are halfway between quantiles and an even spacing.
+        """
+        if not known.any():
+            return None
+        at = _knots(values[known], knots)
+        if len(at) < FEWEST_KNOTS or at[-1] - at[0] <= 0:
+            return None
+        clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])
+        left = np.clip(np.searchsorted(at, clipped, side="right") - 1, 0, len(at) - 2)
+        right_share = np.where(clipped < at[-1], (1 / np.diff(at))[left] * (clipped - at[left]), 1.0)
+        return cls(len(at), left, right_share)
+
+
 def hat_functions(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Array]:
     """Return hat functions of a covariate, each of the covariate's shape; they sum to 1 where it is known.
 
-    Knots are halfway between quantiles and an even spacing. Empty where the covariate has fewer than three knots.
+    Empty where the covariate has fewer than three knots.
     """
     known = mask & np.isfinite(values)
-    if not known.any():
+    between = Between.of(values, known, knots)
+    if between is None:
         return []
-    at = _knots(values[known], knots)
-    if len(at) < FEWEST_KNOTS or at[-1] - at[0] <= 0:
-        return []
-    clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])
-    left = np.clip(np.searchsorted(at, clipped, side="right") - 1, 0, len(at) - 2)
-    right_share = np.where(clipped < at[-1], (1 / np.diff(at))[left] * (clipped - at[left]), 1.0)
-    hats = np.zeros((len(at), *values.shape))
-    np.put_along_axis(hats, left[None], np.where(known, 1 - right_share, 0.0)[None], axis=0)
-    np.put_along_axis(hats, left[None] + 1, np.where(known, right_share, 0.0)[None], axis=0)
+    hats = np.zeros((between.knots, *values.shape))
+    np.put_along_axis(hats, between.left[None], np.where(known, 1 - between.right_share, 0.0)[None], axis=0)
+    np.put_along_axis(hats, between.left[None] + 1, np.where(known, between.right_share, 0.0)[None], axis=0)
     return list(hats)
 
 

@@ -93,6 +93,11 @@ class SwitchingMean:
         return chains.second_state(first, after)
 
 
+def block_lengths(course: Array) -> set[int]:
+    """Return how many readings of a course (reading,) a block has, of each kind."""
+    return {max(len(course) // blocks, 1) for blocks in BLOCKS}
+
+
 def switching_mean(
     course: Array, peers: Sequence[Array] = (), thresholds: Thresholds = THRESHOLDS
 ) -> SwitchingMean | None:
@@ -103,7 +108,7 @@ def switching_mean(
     if len(course) < thresholds.fewest_blocks or not np.ptp(course) > 0:
         return None
     found = []
-    for length in {max(len(course) // blocks, 1) for blocks in BLOCKS}:
+    for length in block_lengths(course):
         switching = _switching(block_means(course, length), [block_means(peer, length) for peer in peers], thresholds)
         if switching is not None:
             (amplitude, share, duration), gain = switching
@@ -114,7 +119,7 @@ def switching_mean(
 def gain_as_noise(course: Array, rest: Array) -> float:
     """Return by how much what is left of a course (reading,) is likelier to be noise, in twice the log likelihood."""
     found = []
-    for length in {max(len(course) // blocks, 1) for blocks in BLOCKS}:
+    for length in block_lengths(course):
         values, size = _standardised(block_means(course, length))
         left = block_means(rest, length)
         found.append(_noise_likelihood((left - left.mean()) / size) - _noise_likelihood(values))
