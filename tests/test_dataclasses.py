@@ -132,7 +132,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         *("Batch", "Left", "_Equations", "OtherStatement", "_Release"),
         "Whitening",
         *("Confined", "ConfinedLaw"),
-        *("Autoregressions", "ExpectedInputs", "UnknownDirections"),
+        *("Autoregressions", "ExpectedInputs", "UnknownDirections", "KnotPlaces", "_Exact"),
         *("Setting", "Drive", "Hypothesis", "Expected", "Choice", "Experimenter"),
         *("Piece", "Law", "Linearised", "Interval", "Segment", "Suffixes", "Search", "Scores", "_Beside"),
         *("CovariateSums", "Profile", "Points", "_Points", "Spline", "FittedForm", "FoundCurve", "EmpiricalFit"),

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.problem.input_doubt import wheels_in_common
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
-from regolithd.calibration.mismatch.signal.hat_basis import Between
+from regolithd.calibration.mismatch.signal.hat_basis import KnotPlaces
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -57,13 +57,13 @@ class _Exact:
     """
 
     known: NDArray[np.bool_]
-    between: Between
+    between: KnotPlaces
 
     @classmethod
     def of(cls, values: Array) -> _Exact | None:
         """Return it for values (time,), None where these hardly vary."""
         known = np.isfinite(values)
-        between = Between.of(values, known, KNOTS)
+        between = KnotPlaces.of(values, known, KNOTS)
         return None if between is None else cls(known, between)
 
     def followed_by(self, values: Array, uncertain: NDArray[np.bool_]) -> tuple[float, Array]:

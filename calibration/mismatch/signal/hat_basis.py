@@ -15,7 +15,7 @@ FEWEST_KNOTS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Between:
+class KnotPlaces:
     """Between which knots the values of a covariate are.
 
     Attributes
@@ -30,7 +30,7 @@ class Between:
     right_share: Array
 
     @classmethod
-    def of(cls, values: Array, known: NDArray[np.bool_], knots: int) -> Between | None:
+    def of(cls, values: Array, known: NDArray[np.bool_], knots: int) -> KnotPlaces | None:
         """Return it for a covariate, None where the `known` values have fewer than three knots.
 
         Knots are halfway between quantiles and an even spacing.
@@ -52,7 +52,7 @@ def hat_functions(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Ar
     Empty where the covariate has fewer than three knots.
     """
     known = mask & np.isfinite(values)
-    between = Between.of(values, known, knots)
+    between = KnotPlaces.of(values, known, knots)
     if between is None:
         return []
     hats = np.zeros((between.knots, *values.shape))
