@@ -228,7 +228,11 @@ def _settled(
     """Search until nothing more is fed back, held, unknown, or late without a name; with where the search began."""
     while True:
         start = starting_values(pose(None))
-        found = _decided(candidates, stated, pose, start, progress)
+        search = _search(candidates, stated, pose, start, progress)
+        if further := fed_back(search.decision):  # the noise was estimated beside a curve that follows it
+            pose = replace(pose, fed=pose.fed | further)
+            continue
+        found = _decided(search, pose, start, progress)
         further, decision = fed_back(found.decision), found.decision
         out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
         out |= untenable(decision.equations, decision.whole)
@@ -249,15 +253,8 @@ def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:
     return (*others, *worse_than_stated(equations, whole, start.problem), INTERVALS_BESIDE_UNEXPLAINED)
 
 
-def _decided(
-    candidates: Sequence[Candidate],
-    stated: Sequence[Stated],
-    pose: _Pose,
-    start: Start,
-    progress: Callable[[str], None],
-) -> Decided:
-    """Search, and keep what held-out readings confirm and what is more probable than chance."""
-    search = _search(candidates, stated, pose, start, progress)
+def _decided(search: _Search, pose: _Pose, start: Start, progress: Callable[[str], None]) -> Decided:
+    """Keep of a search what held-out readings confirm and what is more probable than chance."""
     if (late := as_if_late(search.decision)) is not None:
         beside = _searched_beside_delays(search, late, pose, progress)
         # A delay that is there explains as much as a free response to the past does; a part of an oscillation less.

@@ -32,7 +32,7 @@ from regolithd.calibration.mismatch.selection.smooth_terms import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -82,8 +82,24 @@ def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternat
         if (margin := max(margin, 0.0) if _is_over_another_covariate(decision, fit) else margin) < most:
             best[names] = margin, fit.terms
     found = [Alternative(names, margin, of) for names, (margin, of) in best.items()]
+    found = _with_best_shapes(decision, found)
     found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
     return tuple(sorted(found, key=lambda each: each.margin))
+
+
+def _with_best_shapes(decision: Decision, others: Sequence[Alternative]) -> list[Alternative]:
+    """Return the answers, the best one of names alone with the margin that it has with optimised shapes.
+
+    Where one curve is told: it follows a law more closely than the shapes of a grid do.
+    """
+    behind = [other for other in others if other.margin >= 0 and other.effects and UNEXPLAINED not in other.effects]
+    if not behind or not decision.unnamed or len(decision.whole.terms) > 1:
+        return list(others)
+    near = min(behind, key=lambda each: each.margin)
+    equations, terms = optimised_shapes(decision.equations, near.terms)
+    margin = _Margins(replace(decision, equations=equations)).to(equations.fit(terms))
+    better = replace(near, margin=min(margin, near.margin))
+    return [better if other is near else other for other in others]
 
 
 def with_refused(decision: Decision) -> tuple[Alternative, ...]:

@@ -38,16 +38,14 @@ OLDER, NEWER, LAGS = 8, 2, 8
 """The latest reading of the past, the latest that noise remembers, and how many readings predict. (Choices: in
 strangers' trials the slope with the past of a controller's output fell from 0.3 of that with what is new at two
 readings to 0.1 at eight; that of curves of physics stayed at 0.7 to 1.1 from two readings to twelve.)"""
-LEAST_STDS = 3.0
-"""Standard deviations by which the residual follows what is new more than the past (a choice: one in 700 by chance)."""
-STDS_OF_PAST = 2.0
-"""Standard deviations by which the slope with the past is below that of physics, where what is new is too little for
-the slope with it to be known (a choice: one in forty by chance)."""
-LEAST_OF_PAST = 1 / 2
-"""Slope with the past, as a share of that with what is new, from which on it is physics: half way between feedback,
-which has 0, and physics, which has 1. (−0.1 to 0.4 in 22 simulated chambers whose controller acts on the noise, which
-may have a memory; 0.8 to 2.7 of a cart's roll, a propeller's height, and a chamber's duty that acts by its square.)
-A slope with what is new above 1 counts as 1: a smooth curve over a slow covariate has too little of what is quick."""
+FORGOTTEN, LONGEST_MEMORY = 0.1, 64
+"""Autocorrelation of what is left below which the noise is forgotten, and readings that it lasts at most. (Choices: a
+tenth of the slope with what is new; what lasts longer is no noise, but what a curve over the covariate would explain.)"""
+LEAST_LEAD = 4.0
+"""Lead, in χ², of feedback over physics from which a covariate follows the noise (a choice: e² to one. 5 to 180 in 17
+of 18 curves over the duties of a stranger's incubator, whose controller acts on noise that may last, and −3 in one;
+−700 to −30 in curves of physics there, of a cart's roll, a propeller's height, and a chamber's duty that acts by its
+square.)"""
 
 
 def fed_back(decision: Decision) -> frozenset[str]:
@@ -72,13 +70,24 @@ def _is_fed_back(decision: Decision, covariate: str) -> bool:
     over = [k for k, term in enumerate(whole.terms) if term.name == covariate and not term.group.named]
     named = equations.fit([term for term in whole.terms if term.group.named])
     curve = sum((contribution(equations, whole, k) for k in over), np.zeros(equations.problem.mask.shape))
-    past, known = _predicted(equations.problem, curve, OLDER)
+    left = residual_of(equations, named)
+    past, known = _predicted(equations.problem, curve, max(OLDER, _memory(equations.problem, left)))
     remembered, _ = _predicted(equations.problem, curve, NEWER)
     parts = np.where(known, np.stack((past, remembered - past, curve - remembered)), 0.0)
     parts = np.where(known, left_beside(equations, named, parts), 0.0)
-    left = np.where(known, residual_of(equations, named), 0.0)
+    left = np.where(known, left, 0.0)
     blocks = blocks_of_time(equations.problem, decision.noise)
     return bool(known.any()) and _follows_the_new_alone(parts, left, blocks)
+
+
+def _memory(problem: Problem, left: Array) -> int:
+    """Return after how many readings what is left [time, wheel] is forgotten: noise that lasts is fed back as long."""
+    at = [left[rows[run], wheel] for wheel, (rows, runs) in enumerate(problem.courses) for run in runs]
+    power = sum(float(np.sum(each**2)) for each in at)
+    for lag in range(1, LONGEST_MEMORY):
+        if sum(float(np.sum(each[lag:] * each[:-lag])) for each in at) < FORGOTTEN * power:
+            return lag
+    return LONGEST_MEMORY
 
 
 def _predicted(problem: Problem, curve: Array, newest: int) -> tuple[Array, Mask]:
@@ -97,12 +106,22 @@ def _predicted(problem: Problem, curve: Array, newest: int) -> tuple[Array, Mask
 
 
 def _follows_the_new_alone(parts: Array, left: Array, blocks: NDArray[np.int64]) -> bool:
-    """Return whether what is left [time, wheel] follows the last part [part, time, wheel], and hardly the first."""
+    """Return whether what is left [time, wheel] follows the last part [part, time, wheel], and hardly the first.
+
+    Feedback has no slope with the first part, whatever the others are. Physics has that of the last with all parts, or
+    a larger one: a slope with the last above 1 counts as 1, since a smooth curve over a slow covariate has too little
+    of what is quick. Of either, χ² is how far the slopes are from that.
+    """
     inverse = np.linalg.pinv(np.einsum("atw,btw->ab", parts, parts))
     slopes = inverse @ np.einsum("atw,tw->a", parts, left)
     sums = block_sums(parts * (left - np.einsum("a,atw->tw", slopes, parts)), blocks)
     covariance = inverse @ (sums.T @ sums) @ inverse
-    apart, spread = slopes[-1] - slopes[0], np.sqrt(covariance[0, 0] + covariance[-1, -1] - 2 * covariance[0, -1])
-    physics = LEAST_OF_PAST * min(slopes[-1], 1.0)
-    is_below = physics - slopes[0] > STDS_OF_PAST * np.sqrt(covariance[0, 0])
-    return bool(slopes[0] < physics and (apart > LEAST_STDS * spread or is_below))
+    new = 1.0 if slopes[-1] > 1 else slopes[-1]
+    below = [part for part in range(len(slopes) - 1) if slopes[part] < new]
+    contrast = np.zeros((len(below), len(slopes)))
+    contrast[range(len(below)), below] = -1.0
+    contrast[:, -1] = 1.0 if slopes[-1] <= 1 else 0.0
+    short = new - slopes[below]
+    of_physics = float(short @ np.linalg.pinv(contrast @ covariance @ contrast.T) @ short)
+    of_feedback = float(slopes[0] ** 2 / covariance[0, 0]) if covariance[0, 0] > 0 else 0.0
+    return bool(slopes[0] < new and of_physics - of_feedback > LEAST_LEAD)
