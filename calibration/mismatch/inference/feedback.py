@@ -40,7 +40,7 @@ strangers' trials the slope with the past of a controller's output fell from 0.3
 readings to 0.1 at eight; that of curves of physics stayed at 0.7 to 1.1 from two readings to twelve.)"""
 FORGOTTEN, LONGEST_MEMORY = 0.1, 64
 """Autocorrelation of what is left below which the noise is forgotten, and readings that it lasts at most. (Choices: a
-tenth of the slope with what is new; what lasts longer is no noise, but what a curve over the covariate would explain.)"""
+tenth of the slope with what is new; what lasts longer is no noise, but what a curve over it would explain.)"""
 LEAST_LEAD = 4.0
 """Lead, in χ², of feedback over physics from which a covariate follows the noise (a choice: e² to one. 5 to 180 in 17
 of 18 curves over the duties of a stranger's incubator, whose controller acts on noise that may last, and −3 in one;
