@@ -208,13 +208,16 @@ def _with_likelier_names(
 ) -> tuple[Decision, HeldOutErrors]:
     """Return the answer that has most evidence, of those whose names held-out readings confirm.
 
-    Their names alone lower the held-out error further, or do so with what stays unexplained, or are fewer.
+    Their names alone lower the held-out error further, or do so with what stays unexplained, or are fewer. Of two that
+    are ahead of each other, each beside its own curves, the second is kept.
     """
-    while (other := likelier_names(decision)) is not None:
+    told = [names_of(decision)]
+    while (other := likelier_names(decision)) is not None and names_of(other) not in told:
         other, errors = _errors_beside_curves(other, choice)
         lower = errors.after < held_out.after or errors.whole < held_out.whole
         if errors.without_gain() is None and (lower or names_of(other) < names_of(decision)):
             decision, held_out = other, errors
+            told.append(names_of(decision))
         else:
             decision = replace(decision, equations=other.equations, refused=decision.refused | {names_of(other)})
     return decision, held_out
