@@ -105,3 +105,18 @@ def test_beside_one_effect_pairs_are_tried(monkeypatch: pytest.MonkeyPatch) -> N
     pairs = [(f"0{one}", f"1{other}") for one in range(6) for other in range(2)]
     third = [("00", "10", f"2{k}") for k in range(3)]
     assert [each for each in tried if each] == [*alone, *beside, *pairs, ("00",), *third, ("00", "10")]
+
+
+def test_two_answers_that_are_ahead_of_each_other_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is likelier beside the curves of the other, and lowers the held-out error by less and less: the second."""
+    answers = {name: SimpleNamespace(names=frozenset({name}), refused=frozenset()) for name in ("one", "other")}
+    errors = iter(SimpleNamespace(after=1.0, whole=1.0 / asked, without_gain=lambda: None) for asked in range(1, 9))
+    monkeypatch.setattr(held_out, "groups_to_choose_from", lambda *_: [])
+    monkeypatch.setattr(held_out, "names_of", lambda decision: decision.names)
+    monkeypatch.setattr(held_out, "_errors_beside_curves", lambda decision, _: (decision, next(errors)))
+    monkeypatch.setattr(
+        held_out, "likelier_names", lambda decision: answers["one" if decision is answers["other"] else "other"]
+    )
+    first: Any = answers["one"]
+    found, _ = held_out.confirmed_beside_curves(first, ())
+    assert found is answers["other"]
