@@ -7,10 +7,14 @@ nothing of the noise that comes now: physics follows that part as well as the re
 Free parameters take up most of what is slow in a curve, physics or not. So each part is compared with the residual
 beside them: less what they take up of it. Curves over other covariates take no part. Beside a covariate that follows
 the noise there often is another that balances the slow part of its curve, and with it that part would seem confirmed.
+
+Where a recording has few changes of a covariate that its past predicts, neither is refuted. Then it counts whether the
+noise leads the covariate (Granger, 1969).
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,9 +28,15 @@ from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.as_read import left_beside
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
+from regolithd.calibration.mismatch.selection.cross_validation import training_equations
+from regolithd.calibration.mismatch.signal.chi_squared import quantile
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]
@@ -41,11 +51,16 @@ readings to 0.1 at eight; that of curves of physics stayed at 0.7 to 1.1 from tw
 FORGOTTEN, LONGEST_MEMORY = 0.1, 64
 """Autocorrelation of what is left below which the noise is forgotten, and readings that it lasts at most. (Choices: a
 tenth of the slope with what is new; what lasts longer is no noise, but what a curve over it would explain.)"""
+LEADING, LED_LEVEL = 4, 1e-4
+"""Readings of noise by which a covariate is predicted, and the probability by chance from which they help (choices)."""
+FEWEST_FOR_EACH = 10
+"""Readings for each number that predicts a covariate, at least (a choice: chance adds a tenth of what is left)."""
+REFUTED = 9.0
+"""χ² from which a covariate that the noise leads is not only fed back: three standard deviations of the slope with its
+past."""
 LEAST_LEAD = 4.0
-"""Lead, in χ², of feedback over physics from which a covariate follows the noise (a choice: e² to one. 5 to 180 in 17
-of 18 curves over the duties of a stranger's incubator, whose controller acts on noise that may last, and −3 in one;
-−700 to −30 in curves of physics there, of a cart's roll, a propeller's height, and a chamber's duty that acts by its
-square.)"""
+"""Lead, in χ², of feedback over physics from which a covariate follows the noise (a choice: e² to one. Of curves over
+the outputs of a stranger's controllers five of six have 8 to 68, and six of physics −1200 to −19.)"""
 
 
 def fed_back(decision: Decision) -> frozenset[str]:
@@ -69,7 +84,7 @@ def _is_fed_back(decision: Decision, covariate: str) -> bool:
     equations, whole = decision.equations, decision.whole
     over = [k for k, term in enumerate(whole.terms) if term.name == covariate and not term.group.named]
     named = equations.fit([term for term in whole.terms if term.group.named])
-    curve = sum((contribution(equations, whole, k) for k in over), np.zeros(equations.problem.mask.shape))
+    curve = _as_others_fitted(equations, whole, over)
     left = residual_of(equations, named)
     past, known = _predicted(equations.problem, curve, max(OLDER, _memory(equations.problem, left)))
     remembered, _ = _predicted(equations.problem, curve, NEWER)
@@ -77,7 +92,25 @@ def _is_fed_back(decision: Decision, covariate: str) -> bool:
     parts = np.where(known, left_beside(equations, named, parts), 0.0)
     left = np.where(known, left, 0.0)
     blocks = blocks_of_time(equations.problem, decision.noise)
-    return bool(known.any()) and _follows_the_new_alone(parts, left, blocks)
+    if not known.any():
+        return False
+    physics, feedback = _chi_squared(parts, left, blocks)
+    if physics - feedback > LEAST_LEAD:
+        return True
+    return feedback < REFUTED and _is_led_by(equations.problem, covariate, curve, residual_of(equations, whole))
+
+
+def _as_others_fitted(equations: NormalEquations, whole: Fit, over: Sequence[int]) -> Array:
+    """Return what some terms of a fit add [time, wheel], on each fold as the other folds have fitted them.
+
+    Noise that lasts is as slow as what the past predicts of a curve: that would follow the readings it was fitted to.
+    """
+    design, found = equations.design, np.zeros(equations.problem.mask.shape)
+    for fold, (first, last) in enumerate(pairwise(design.cuts)):
+        train = training_equations(equations, fold).fit(whole.terms)
+        rows = design.order[first:last]
+        found[rows] = sum((contribution(equations, train, k)[rows] for k in over), np.zeros(()))
+    return found
 
 
 def _memory(problem: Problem, left: Array) -> int:
@@ -105,12 +138,40 @@ def _predicted(problem: Problem, curve: Array, newest: int) -> tuple[Array, Mask
     return found, known
 
 
-def _follows_the_new_alone(parts: Array, left: Array, blocks: NDArray[np.int64]) -> bool:
-    """Return whether what is left [time, wheel] follows the last part [part, time, wheel], and hardly the first.
+def _is_led_by(problem: Problem, covariate: str, curve: Array, noise: Array) -> bool:
+    """Return whether the noise [time, wheel] tells what a covariate does next beyond its own past (Granger, 1969).
 
-    Feedback has no slope with the first part, whatever the others are. Physics has that of the last with all parts, or
-    a larger one: a slope with the last above 1 counts as 1, since a smooth curve over a slow covariate has too little
-    of what is quick. Of either, χ² is how far the slopes are from that.
+    What nobody controls by the reading does not know the reading's noise. A controller's output has that noise in it,
+    of which its `curve` [time, wheel] has a part: who knows both knows where the output was without.
+    """
+    values, at = problem.covariates[covariate], []
+    for wheel, (rows, runs) in enumerate(problem.courses):
+        at += [(rows[run], wheel) for run in runs if len(rows[run]) > LAGS]
+
+    def past(of: Array, lags: int) -> Array:
+        """Return so many readings before each that has all of them, shape (reading, lag)."""
+        return np.concatenate([sliding_window_view(of[each], LAGS)[:-1, -lags:] for each in at])
+
+    if not at:
+        return False
+    now = np.concatenate([values[rows[LAGS:], wheel] for rows, wheel in at])
+    own = np.column_stack((past(values, LAGS), past(curve, LEADING), np.ones(len(now))))
+    known = np.isfinite(now) & np.isfinite(own).all(axis=1)
+    if known.sum() < FEWEST_FOR_EACH * (own.shape[1] + LEADING):
+        return False
+    without, with_noise = (
+        float(np.sum((now[known] - columns @ np.linalg.lstsq(columns, now[known], rcond=None)[0]) ** 2))
+        for columns in (own[known], np.column_stack((own, past(noise, LEADING)))[known])
+    )
+    return with_noise > 0 and int(known.sum()) * np.log(without / with_noise) > quantile(LEADING, LED_LEVEL)
+
+
+def _chi_squared(parts: Array, left: Array, blocks: NDArray[np.int64]) -> tuple[float, float]:
+    """Return how far the slopes of what is left [time, wheel] with parts of a curve [part, time, wheel] are off.
+
+    From those of physics, and from those of feedback. Feedback has no slope with the first part, whatever the others
+    are. Physics has that of the last with all parts, or a larger one: a slope with the last above 1 counts as 1, since
+    a smooth curve over a slow covariate has too little of what is quick.
     """
     inverse = np.linalg.pinv(np.einsum("atw,btw->ab", parts, parts))
     slopes = inverse @ np.einsum("atw,tw->a", parts, left)
@@ -124,4 +185,4 @@ def _follows_the_new_alone(parts: Array, left: Array, blocks: NDArray[np.int64])
     short = new - slopes[below]
     of_physics = float(short @ np.linalg.pinv(contrast @ covariance @ contrast.T) @ short)
     of_feedback = float(slopes[0] ** 2 / covariance[0, 0]) if covariance[0, 0] > 0 else 0.0
-    return bool(slopes[0] < new and of_physics - of_feedback > LEAST_LEAD)
+    return of_physics if slopes[0] < new else 0.0, of_feedback

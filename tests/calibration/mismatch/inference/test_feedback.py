@@ -83,6 +83,31 @@ def test_the_note_says_what_cannot_be_told_apart() -> None:
     assert "record another sensor" in told
 
 
+def quickly_heated(seed: int) -> Recording:
+    """Return a recording of a quick controller, of which half of the noise lasts for a minute."""
+    random, t_s = np.random.default_rng(seed), STEP_S * np.arange(COUNT)
+    wanted = np.repeat(random.uniform(30, 60, COUNT // 250), 250)
+    outside = 15 + 4 * np.sin(t_s / 2500 + random.uniform(0, 6))
+    lasting = lfilter([np.sqrt(1 - 0.93**2)], [1.0, -0.93], random.normal(size=COUNT))
+    noise = NOISE_K * (random.normal(size=COUNT) + lasting) / np.sqrt(2)
+    duty, measured, state, total = np.zeros(COUNT), np.zeros(COUNT), 20.2, 0.0
+    for k in range(COUNT):
+        error = wanted[k] - state - noise[k]
+        total = float(np.clip(total + 0.02 * error, 0, 100))
+        duty[k] = np.clip(40 * error + total, 0, 100)
+        measured[k] = state + noise[k]
+        state += STEP_S * (9.1 * duty[k] - 14.2 * (state - outside[k])) / 30300
+    return from_columns({"t_s": t_s, "duty_pct": duty, "outside_degC": outside, "temperature_degC": measured})
+
+
+@pytest.mark.parametrize("seed", [2, 3, 6])
+def test_noise_that_lasts_is_fed_back_as_long(seed: int) -> None:
+    """A few steps of the set point are all that the duty's past predicts: the noise tells what the duty does next."""
+    found = compare(quickly_heated(seed), Chamber()).answer
+    assert found.verdict == "consistent"
+    assert [note for note in found.notes if "controller" in note]
+
+
 @pytest.mark.parametrize("acts_on_noise", [0.0, 0.3])
 def test_what_follows_the_duty_itself_stays_unexplained(acts_on_noise: float) -> None:
     """An offset by the duty's square is followed by its past as well as by what is new."""
