@@ -229,11 +229,11 @@ def _settled(
     while True:
         start = starting_values(pose(None))
         search = _search(candidates, stated, pose, start, progress)
-        if further := fed_back(search.decision):  # the noise was estimated beside a curve that follows it
+        if further := fed_back(search.decision) - pose.fed:  # the noise was estimated beside a curve that follows it
             pose = replace(pose, fed=pose.fed | further)
             continue
         found = _decided(search, pose, start, progress)
-        further, decision = fed_back(found.decision), found.decision
+        further, decision = fed_back(found.decision) - pose.fed, found.decision
         out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
         out |= untenable(decision.equations, decision.whole)
         unknown = unknown_states(decision.equations, decision.whole)

@@ -183,6 +183,11 @@ def _stays_within(speed: Array, reach: float) -> NDArray[np.bool_]:
     return within
 
 
+def names_of_prediction(channel: str) -> tuple[str, str]:
+    """Return what the size of the prediction of a channel is called among the covariates: either of these."""
+    return "torque", quantity(channel)
+
+
 def quantity(channel: str) -> str:
     """Return a channel's name without the unit at its end: `load` of `load_N` and of `load_kN`."""
     if found := LITRES.fullmatch(channel):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.motion import along_motion
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
-from regolithd.calibration.mismatch.problem.covariates import quantity
+from regolithd.calibration.mismatch.problem.covariates import names_of_prediction
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
@@ -51,7 +51,10 @@ PLACES = 512
 
 
 def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
-    """Add, for each covariate, smooth terms that act as drag, as an offset, and in proportion to the prediction."""
+    """Add, for each covariate, smooth terms that act as drag, as an offset, and in proportion to the prediction.
+
+    And a constant share of the prediction on one wheel.
+    """
     problem = design.problem
     couplings = couplings_of(problem)
     for name, values in problem.covariates.items():
@@ -62,11 +65,7 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
                 _ways_to_act(problem, name, couplings) if len(hats) >= FEWEST_KNOTS else ()
             ):
                 design = with_group(design, name, [hat * factor for hat in hats], coupling, sharing)
-    for name in ("torque", quantity(problem.simulation.channel)):
-        if problem.mask.shape[1] > 1 and name in problem.covariates and not problem.arbitrary_zero:
-            penalty = problem.thresholds.single_wheel_penalty
-            design = with_group(design, name, [couplings["gain"]], "gain", ("one",), penalty)
-            break
+    design = _with_constant_share(design, couplings["gain"])
     speed = problem.covariates.get("wheel_speed")
     if speed is not None and np.nanmin(speed) < 0:
         # What acts one way only is neither a drag nor an offset.
@@ -75,6 +74,19 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     coupling = "drag" if "drag" in couplings else "offset"
     hats = hat_functions(problem.covariates["time"], problem.mask, problem.thresholds.time_knots)
     return with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
+
+
+def _with_constant_share(design: DesignMatrix, prediction: Array) -> DesignMatrix:
+    """Add a constant share of the prediction on one wheel of several, as of a sensor whose scale is wrong.
+
+    It is over the size of the prediction, and pays for one wheel alone as a law does. Of all wheels the parameters hold
+    it; where the zero of the column means nothing, it has no meaning.
+    """
+    problem = design.problem
+    over = [name for name in names_of_prediction(problem.simulation.channel) if name in problem.covariates]
+    if len(problem.mask.T) == 1 or problem.arbitrary_zero or not over or over[0] in problem.fed_back:
+        return design
+    return with_group(design, over[0], [prediction], "gain", ("one",), problem.thresholds.single_wheel_penalty)
 
 
 def has_smooth_term(problem: Problem, covariate: str) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
-from regolithd.calibration.mismatch.problem.covariates import quantity
+from regolithd.calibration.mismatch.problem.covariates import names_of_prediction
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
@@ -74,7 +74,7 @@ def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[T
 
 def is_of_the_prediction(problem: Problem, term: Term) -> bool:
     """Return whether a term is over the size of the prediction, or over its past."""
-    return term.imitated_over in {"torque", quantity(problem.simulation.channel)} | LAGGED
+    return term.imitated_over in {*names_of_prediction(problem.simulation.channel)} | LAGGED
 
 
 def as_stated(equations: NormalEquations) -> NormalEquations:
