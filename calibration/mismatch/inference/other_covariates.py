@@ -104,9 +104,13 @@ def notes_on_a_curve_in_place(decision: Decision, others: Sequence[Alternative])
     ]
     if len(decision.named.terms) != 1 or not curves or curves[0].group.coupling in WITHOUT_CURVE:
         return ()
-    (named,) = decision.named.terms
-    here, there = word_for(named.imitated_over, labels), word_for(curves[0].name, labels)
-    note = f"{named.name} is about as probable as something without a name that follows the {there}"
+    (named,), (curve, *_) = decision.named.terms, curves
+    here, there = word_for(named.imitated_over, labels), word_for(curve.name, labels)
+    shape = "a constant share of the prediction, without a name"
+    what = shape if is_constant(curve) else f"something without a name that follows the {there}"
+    note = f"{named.name} is about as probable as {what}"
+    if is_constant(curve) or named.imitated_over == "none":
+        return (f"{note}: the {there} has to vary further to tell.",)
     why = f"{here} and {there} go together in this recording"
     return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare, from_columns
+from regolithd.calibration.mismatch.inference.other_covariates import notes_on_a_curve_in_place
+from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -98,3 +102,31 @@ def test_a_curve_says_where_it_may_be_a_share_or_an_offset(varied: float, told: 
     about = [note for note in found.notes if note.startswith("Whether what is unexplained over the stirrer is ")]
     assert bool(about) is told
     assert all("a share of the prediction" in note and "an offset" in note for note in about)
+
+
+ONE_OF_TWO = (
+    "temperature and load go together in this recording. One has to vary without the other to tell which it depends on."
+)
+FURTHER = "the load has to vary further to tell."
+
+
+@pytest.mark.parametrize(
+    ("over", "knots", "what", "why"),
+    [
+        ("temperature", 8, "something without a name that follows the load", ONE_OF_TWO),
+        ("none", 8, "something without a name that follows the load", FURTHER),
+        ("temperature", 1, "a constant share of the prediction, without a name", FURTHER),
+    ],
+)
+def test_a_curve_that_is_as_probable_as_the_only_name_is_told_beside_it(
+    over: str, knots: int, what: str, why: str
+) -> None:
+    """Over another covariate, beside a constant, which has none, and as a constant share."""
+    group = SimpleNamespace(named=False, region=None, columns=(0,) * knots, coupling="gain")
+    curve: Any = SimpleNamespace(name="load", group=group)
+    decision: Any = SimpleNamespace(
+        equations=SimpleNamespace(problem=SimpleNamespace(labels={}), thresholds=THRESHOLDS),
+        named=SimpleNamespace(terms=[SimpleNamespace(name="bearing-drag", imitated_over=over)]),
+    )
+    other: Any = SimpleNamespace(effects=(UNEXPLAINED,), terms=(curve,), margin=1.0)
+    assert notes_on_a_curve_in_place(decision, [other]) == (f"bearing-drag is about as probable as {what}: {why}",)
