@@ -58,9 +58,10 @@ FEWEST_FOR_EACH = 10
 REFUTED = 9.0
 """χ² from which a covariate that the noise leads is not only fed back: three standard deviations of the slope with its
 past."""
-LEAST_LEAD = 4.0
-"""Lead, in χ², of feedback over physics from which a covariate follows the noise (a choice: e² to one. Of curves over
-the outputs of a stranger's controllers five of six have 8 to 68, and six of physics −1200 to −19.)"""
+LEAST_LEAD = 6.0
+"""Lead, in χ², of feedback over physics from which a covariate follows the noise (a choice: e³ to one. Of curves over
+the outputs of a stranger's controllers five of six have 8 to 68; six of physics have −1200 to −19, and one over a load
+that jumps, of which the past predicts little, 4.)"""
 
 
 def fed_back(decision: Decision) -> frozenset[str]:
