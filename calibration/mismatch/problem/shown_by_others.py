@@ -41,7 +41,7 @@ SINGULAR = 1e-9
 """Relative singular value below which a knot has no readings: rounding."""
 LEAST_OF_TRUTH = 1 / 2
 """What was taken out beyond errors of the stated size, as a share of what follows exact inputs (a choice: half way
-between that of errors, which is none, and that of the truth, which is all; 1.3 to 4 in six recordings of a loom)."""
+between that of errors, which is none, and that of the truth, which is all; 1.3 to 4 in five recordings of a loom)."""
 READINGS_A_KNOT = 10
 """Readings for each knot from which it is asked (a choice: the function has a tenth of the error then)."""
 
