@@ -51,7 +51,7 @@ readings to 0.1 at eight; that of curves of physics stayed at 0.7 to 1.1 from tw
 FORGOTTEN, LONGEST_MEMORY = 0.1, 64
 """Autocorrelation of what is left below which the noise is forgotten, and readings that it lasts at most. (Choices: a
 tenth of the slope with what is new; what lasts longer is no noise, but what a curve over it would explain.)"""
-LEADING, LED_LEVEL = 4, 1e-4
+GRANGER_LAGS, GRANGER_LEVEL = 4, 1e-4
 """Readings of noise by which a covariate is predicted, and the probability by chance from which they help (choices)."""
 FEWEST_FOR_EACH = 10
 """Readings for each number that predicts a covariate, at least (a choice: chance adds a tenth of what is left)."""
@@ -98,7 +98,7 @@ def _is_fed_back(decision: Decision, covariate: str) -> bool:
     physics, feedback = _chi_squared(parts, left, blocks)
     if physics - feedback > LEAST_LEAD:
         return True
-    return feedback < REFUTED and _is_led_by(equations.problem, covariate, curve, residual_of(equations, whole))
+    return feedback < REFUTED and _is_granger_caused(equations.problem, covariate, curve, residual_of(equations, whole))
 
 
 def _as_others_fitted(equations: NormalEquations, whole: Fit, over: Sequence[int]) -> Array:
@@ -139,7 +139,7 @@ def _predicted(problem: Problem, curve: Array, newest: int) -> tuple[Array, Mask
     return found, known
 
 
-def _is_led_by(problem: Problem, covariate: str, curve: Array, noise: Array) -> bool:
+def _is_granger_caused(problem: Problem, covariate: str, curve: Array, noise: Array) -> bool:
     """Return whether the noise [time, wheel] tells what a covariate does next beyond its own past (Granger, 1969).
 
     What nobody controls by the reading does not know the reading's noise. A controller's output has that noise in it,
@@ -156,15 +156,15 @@ def _is_led_by(problem: Problem, covariate: str, curve: Array, noise: Array) -> 
     if not at:
         return False
     now = np.concatenate([values[rows[LAGS:], wheel] for rows, wheel in at])
-    own = np.column_stack((past(values, LAGS), past(curve, LEADING), np.ones(len(now))))
+    own = np.column_stack((past(values, LAGS), past(curve, GRANGER_LAGS), np.ones(len(now))))
     known = np.isfinite(now) & np.isfinite(own).all(axis=1)
-    if known.sum() < FEWEST_FOR_EACH * (own.shape[1] + LEADING):
+    if known.sum() < FEWEST_FOR_EACH * (own.shape[1] + GRANGER_LAGS):
         return False
     without, with_noise = (
         float(np.sum((now[known] - columns @ np.linalg.lstsq(columns, now[known], rcond=None)[0]) ** 2))
-        for columns in (own[known], np.column_stack((own, past(noise, LEADING)))[known])
+        for columns in (own[known], np.column_stack((own, past(noise, GRANGER_LAGS)))[known])
     )
-    return with_noise > 0 and int(known.sum()) * np.log(without / with_noise) > quantile(LEADING, LED_LEVEL)
+    return with_noise > 0 and int(known.sum()) * np.log(without / with_noise) > quantile(GRANGER_LAGS, GRANGER_LEVEL)
 
 
 def _chi_squared(parts: Array, left: Array, blocks: NDArray[np.int64]) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_bet
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import ExpectedInputs, smoothed_inputs
+from regolithd.calibration.mismatch.problem.exact_covariates import given_exact_covariates
 from regolithd.calibration.mismatch.problem.gaps import carried_over_gaps, inputs_otherwise_in_gaps
 from regolithd.calibration.mismatch.problem.input_doubt import (
     InputDoubt,
@@ -30,7 +31,6 @@ from regolithd.calibration.mismatch.problem.input_doubt import (
 from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
 from regolithd.calibration.mismatch.problem.input_units import notes_on_units
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
-from regolithd.calibration.mismatch.problem.shown_by_others import with_what_others_show
 from regolithd.calibration.mismatch.problem.shown_errors import notes_on_errors, shown_errors
 from regolithd.calibration.mismatch.signal.robust import robust_std
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
@@ -148,11 +148,11 @@ def inputs_of(
     )
     # Columns that the simulation derives may have the errors of those that they are derived from.
     exact = [name for name in recording.channels if name not in made.smoothers and name != simulation.channel]
-    expected = with_what_others_show(as_read, made, errors, exact)
+    expected = given_exact_covariates(as_read, made, errors, exact)
     otherwise = None
     if blanks:
         other_way, _ = _prepared(recording, simulation, other_way=True)
-        otherwise = with_what_others_show(other_way, smoothed_inputs(other_way, errors, normal), errors, exact)
+        otherwise = given_exact_covariates(other_way, smoothed_inputs(other_way, errors, normal), errors, exact)
     predicted = cache(lambda: predict(as_read))
     between = _between_readings(recording, simulation, values, predicted)
     by_errors = input_doubt(as_read, expected, simulation, values, errors, made.smoothers)

@@ -7,7 +7,7 @@ import numpy as np
 from regolithd.calibration.mismatch import SensorError
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.errors_in_variables import smoothed_inputs
-from regolithd.calibration.mismatch.problem.shown_by_others import with_what_others_show
+from regolithd.calibration.mismatch.problem.exact_covariates import given_exact_covariates
 
 ROWS, ERROR = 3000, 40.0
 ERRORS = {"tension": SensorError(absolute=ERROR)}
@@ -28,7 +28,7 @@ def recording(tension: np.ndarray, **others: np.ndarray) -> Recording:
 def completed(recorded: Recording, exact: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return the tension as it was smoothed, and with what exact columns show, shape (time,) each."""
     made = smoothed_inputs(recorded, ERRORS)
-    found = with_what_others_show(recorded, made, ERRORS, exact)
+    found = given_exact_covariates(recorded, made, ERRORS, exact)
     return made.recording.channels["tension"][:, 0], found.channels["tension"][:, 0]
 
 
@@ -91,11 +91,11 @@ def test_each_axis_has_its_own_angle() -> None:
         "angle": np.stack([angle for _, angle in of_axes], axis=1).ravel(),
     }
     recorded = from_columns(rows)
-    found = with_what_others_show(recorded, smoothed_inputs(recorded, ERRORS), ERRORS, ("angle",))
+    found = given_exact_covariates(recorded, smoothed_inputs(recorded, ERRORS), ERRORS, ("angle",))
     for axis, (truth, angle) in enumerate(of_axes):
         assert largest_mean(found.channels["tension"][:, axis] - truth, angle) < 0.25 * ERROR
     shared = from_columns(
         {**rows, "tension": np.repeat(rows["tension"][::2], 2), "angle": np.repeat(rows["angle"][::2], 2)}
     )
-    both = with_what_others_show(shared, smoothed_inputs(shared, ERRORS), ERRORS, ("angle",)).channels["tension"]
+    both = given_exact_covariates(shared, smoothed_inputs(shared, ERRORS), ERRORS, ("angle",)).channels["tension"]
     np.testing.assert_array_equal(both[:, 0], both[:, 1])

@@ -1,18 +1,19 @@
-"""What smoothing takes from an input that inputs without an error show.
+"""Noisy inputs given covariates that have no error: what smoothing in time takes of an input that these show.
 
-The error of a reading is independent of every other input. Where what smoothing took out of the readings follows an
-input that is known exactly, that part is no error but the truth: a tension that goes up and down with the angle of a
-crank, of which a model of time alone takes a share with each turn. What it follows is put back, so that the expectation
-is one given that input, too (regression calibration with exact covariates; Carroll et al., 2006, chapter 4). Else a
-prediction lacks a share that follows the angle, as if physics were missing that depends on it.
+The error of a reading is independent of every other input. Where what smoothing took out of the readings follows a
+column that is known exactly, that part is no error but the truth: a tension that goes up and down with the angle of a
+crank, of which a model of time alone takes a share with each turn. It is put back, so that the expectation is one given
+the exact covariates, too (regression calibration; Carroll et al., 2006, chapter 4). Else a prediction lacks a share
+that follows the angle, as if physics were missing that depends on it.
 
-An exact input may follow the error all the same: a controller acts on the reading, or a column was computed from it. By
-the truth more is taken out than a smoother takes of errors of the stated size, and by the error itself no more.
+An exact column may follow the error all the same: a controller acts on the reading, or it was computed from it. By the
+truth more is taken out than a smoother takes of errors of the stated size, and by the error itself no more.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,7 +94,7 @@ class _Exact:
         return gain - by_chance, np.where(self.known, function, 0.0)
 
 
-def with_what_others_show(
+def given_exact_covariates(
     as_read: Recording, made: ExpectedInputs, errors: Mapping[str, SensorError], exact: Sequence[str]
 ) -> Recording:
     """Return the smoothed inputs of a recording with what smoothing took of them that exact columns show.
@@ -104,19 +105,25 @@ def with_what_others_show(
     made: with the inputs that have these `errors` smoothed, and how
     exact: names of columns without an error
     """
-    others = [as_read.channels[name] for name in exact]
-    shared = [each for values in others if wheels_in_common(values) > 1 and (each := _Exact.of(values[:, 0]))]
+
+    @cache
+    def exact_columns(wheel: int | None) -> list[_Exact]:
+        """Return those of one wheel; None: those that all wheels share."""
+        others = (as_read.channels[name] for name in exact)
+        kept = (values for values in others if wheel is not None or wheels_in_common(values) > 1)
+        return [each for values in kept if (each := _Exact.of(values[:, wheel or 0]))]
+
     completed = {}
     for name, smoothers in made.smoothers.items():
         read, smooth = as_read.channels[name], made.recording.channels[name]
         if wheels_in_common(read) > 1:
-            column = _completed(read[:, 0], smooth[:, 0], errors[name], smoothers[0], shared)
+            column = _completed(read[:, 0], smooth[:, 0], errors[name], smoothers[0], exact_columns(None))
             completed[name] = np.repeat(column[:, None], read.shape[1], axis=1)
             continue
-        columns = []
-        for wheel, smoother in enumerate(smoothers):
-            own = [each for values in others if (each := _Exact.of(values[:, wheel]))]
-            columns.append(_completed(read[:, wheel], smooth[:, wheel], errors[name], smoother, own))
+        columns = [
+            _completed(read[:, wheel], smooth[:, wheel], errors[name], smoother, exact_columns(wheel))
+            for wheel, smoother in enumerate(smoothers)
+        ]
         completed[name] = np.stack(columns, axis=1)
     return made.recording.with_channels(**completed)
 
