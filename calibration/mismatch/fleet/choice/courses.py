@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -50,6 +50,15 @@ class Course:
         onset = at[place - 1] if place else at[0]
         relative = np.clip(at - onset, 0, None) / max(at[-1] - onset, 1e-300)
         return np.where(after, relative**self.power, 0.0)
+
+    def among(self, recordings: Sequence[int], when: Array) -> Course:
+        """Return the same course in fewer recordings, in the order of time: its date is of the next that is among them.
+
+        A rover's effect begins or ends between two of its recordings (`search.place_of`): there is a next one.
+        """
+        if self.kind == "always" or self.first in recordings:
+            return self
+        return replace(self, first=next(place for place in recordings if when[place] >= when[self.first]))
 
 
 def courses_over(recordings: Sequence[int], *, begins: bool) -> list[Course]:

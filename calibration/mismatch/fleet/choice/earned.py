@@ -81,7 +81,7 @@ class _Names:
         term, rovers = self.fit.terms[index], chooser.showing(beside, index)
         if not term.units.each or rovers in {(), term.units.rovers}:
             return without(self.fit, index)
-        on_them = replace(term, units=replace(term.units, rovers=rovers))
+        on_them = chooser.equations.on_rovers(term, rovers)
         return (*self.fit.terms[:index], on_them, *self.fit.terms[index + 1 :])
 
     def _lead(self, index: int) -> float:

@@ -143,6 +143,11 @@ class FleetEquations:
         at = np.array(sorted(i for rover in rovers for i in self.recordings_of[rover]), np.int64)
         return tuple(int(i) for i in at[np.argsort(self.when[at], kind="stable")])
 
+    def on_rovers(self, term: FleetTerm, rovers: tuple[int, ...]) -> FleetTerm:
+        """Return a term on these of its rovers alone."""
+        course = term.course.among(self.of_rovers(rovers), self.when)
+        return replace(term, units=replace(term.units, rovers=rovers), course=course)
+
     def factors(self, term: FleetTerm) -> Array:
         """Return the factors of a term's sizes, shape (size, recording, wheel): one for each of its parts."""
         recordings = self.of_rovers(term.units.rovers)

@@ -110,11 +110,13 @@ class Chooser:
         old = fit.terms[index]
         if len(old.units.rovers) == 1 or old.group.of_wheels:
             return []
-        units = replace(old.units, each=True)
-        of_all = [units] if old.course.kind == "always" else []
-        shown = replace(units, rovers=self.showing(fit, index))
-        of_some = [shown, replace(shown, each=False)] if shown.rovers not in {(), units.rovers} else []
-        return [replace(old, units=each) for each in (*of_all, *of_some)]
+        each = replace(old, units=replace(old.units, each=True))
+        found = [each] if old.course.kind == "always" else []
+        rovers = self.showing(fit, index)
+        if rovers not in {(), old.units.rovers}:
+            shown = self.equations.on_rovers(each, rovers)
+            found += [shown, replace(shown, units=replace(shown.units, each=False))]
+        return found
 
     def showing(self, fit: FleetFit, index: int) -> tuple[int, ...]:
         """Return the rovers of a term that show it, each with a size of its own beside the other terms."""

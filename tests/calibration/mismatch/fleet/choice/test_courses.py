@@ -32,6 +32,15 @@ def test_what_is_a_change_by_its_nature_begins_later() -> None:
     assert courses_over([3], begins=True) == []
 
 
+def test_in_fewer_recordings_the_date_is_of_the_next_that_is_left() -> None:
+    """The recording at which an effect of several rovers begins may be one of a rover that does not show it."""
+    since = Course("since", 1)
+    assert since.among([0, 2, 3], WHEN) == Course("since", 2)
+    np.testing.assert_allclose(since.among([0, 2, 3], WHEN).factors([0, 2, 3], WHEN), [0, 1, 1])
+    assert since.among([0, 1, 3], WHEN) is since
+    assert Course("always").among([2, 3], WHEN) == Course("always")
+
+
 def test_the_dates_of_a_long_season_are_thinned_out() -> None:
     """Not more than so many are searched, the first and the last among them."""
     dates = [course.first for course in courses_over(range(500), begins=True) if course.kind == "since"]

@@ -56,6 +56,15 @@ def test_effects_have_their_rovers_wheels_and_dates() -> None:
     ]
 
 
+def test_a_date_of_a_rover_that_does_not_show_it_is_of_the_next_that_does() -> None:
+    """What was found on both rovers, since a recording of the second, is searched anew on the first alone."""
+    of = equations({n: on_both(1, 0.12) for n in (6, 8)})
+    both = FleetTerm(DRAG, Units((0, 1), (0, 1)), Course("since", 5))
+    one = chooser(of)._on_fewer_rovers(of.fit([both]), 0)
+    assert {(each.units.rovers, each.course) for each in one} == {((0,), Course("since", 6))}
+    assert told(chooser(of).chosen().terms) == [("steady-drag", "all", (0,), (0, 1), "since", 6)]
+
+
 def test_a_size_of_each_rover_s_own_is_told_from_one_size() -> None:
     """Where rovers differ by more than the noise, each has its own."""
     of = equations({n: on_both(1, 0.2 if n % 2 else 0.3) for n in range(10)})
