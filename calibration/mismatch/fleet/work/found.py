@@ -87,6 +87,7 @@ class Found:
     labels: what covariates are called, with their units
     reversal: how friction reverses, empty: at once; None: it has to be computed
     smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where they have to be computed
+    unknown: initial states of runs, by their names, that are far off
     """
 
     findings: Findings
@@ -105,6 +106,7 @@ class Found:
     responses: dict[str, Responses] = field(default_factory=dict)
     reversal: Shape | None = None
     smoothed: dict[str, Single] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
 
 
 def one_channel(simulation: Simulation, channel: str) -> Simulation:
@@ -147,6 +149,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         responses=_responses(decision, of_recording.applicable),
         reversal=dict(reversal_of(problem)),
         smoothed={name: values.astype(np.float32) for name, values in problem.smoothed.items()},
+        unknown=tuple(sorted(problem.unknown)),
     )
 
 

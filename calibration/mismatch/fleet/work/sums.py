@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.reversal import keep_reversal
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, columns_of
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.initial_states import initial_states
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
@@ -113,6 +114,7 @@ def sums_of(
     # Measured from the stated values, not from where this recording's own comparison linearised the simulation.
     residual = problem.residual + np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
     noise = NoiseModel(found.deviation, found.autocorrelation_times)
+    columns, residual = _whitened_by_initial_states(problem, columns, residual, noise)
     gram, moment, fourth = _products(columns.values, residual)
     left = _left(columns, residual, gram, moment, noise)
     return Sums(
@@ -181,7 +183,9 @@ def _posed(
         late_on=found.late_inputs_on,
         thresholds=thresholds,
     )
-    problem = replace(corrected_problem(problem, stated), late=found.late, late_on=found.late_on)
+    problem = replace(
+        corrected_problem(problem, stated), late=found.late, late_on=found.late_on, unknown=frozenset(found.unknown)
+    )
     if found.reversal is not None:
         keep_reversal(problem, found.reversal)
     return problem
@@ -202,6 +206,30 @@ def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: S
     whole = problem.mask.shape
     values = np.where(problem.mask, np.stack([np.broadcast_to(each, whole) for each in made]), 0.0)
     return _Columns(values, tuple(names), np.array(stds), shifts, tuple(places), tuple(own))
+
+
+def _whitened_by_initial_states(
+    problem: Problem, columns: _Columns, residual: Array, noise: NoiseModel
+) -> tuple[_Columns, Array]:
+    """Return columns and residual in which what the initial states of runs leave is as uncertain as the noise is.
+
+    An initial state s, with its prior variance v, adds v s s' to the covariance of the noise 1/w. Both are multiplied
+    by the inverse square root of the sum, over that of the noise: their products are those of a fit in which each run
+    has its own initial state, which no other recording shares.
+    """
+    states = tuple(initial_states(problem))
+    values, residual = columns.values.copy() if states else columns.values, residual.copy()
+    for state, shown in zip(states, as_shown(problem, [state.column for state in states]), strict=True):
+        rows, wheel = state.rows, state.wheel
+        course = np.where(problem.mask[rows, wheel], shown[rows, wheel], 0.0)
+        energy = float(course @ course)
+        if energy == 0:
+            continue
+        known = 1 / np.sqrt(1 + state.std**2 * noise.weights[wheel] * energy)
+        along = (1 - known) / energy * course
+        values[:, rows, wheel] -= np.outer(values[:, rows, wheel] @ course, along)
+        residual[rows, wheel] -= (residual[rows, wheel] @ course) * along
+    return replace(columns, values=values), residual
 
 
 def _of_law(problem: Problem, candidate: Candidate, shape: Shape) -> Array:

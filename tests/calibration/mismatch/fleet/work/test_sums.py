@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import fleet_arm
 import numpy as np
 import pytest
 from sample_answer import FINDINGS
+from scipy.signal import lfilter
 
-from regolithd.calibration.mismatch.data.recording import as_recording
+from regolithd.calibration.mismatch import Prior, Simulation
+from regolithd.calibration.mismatch.data.recording import as_recording, from_columns
 from regolithd.calibration.mismatch.fleet.work import sums as of_recordings
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.fleet.work.sums import Sums, sums_of
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.covariates import direction_of
+from regolithd.calibration.mismatch.problem.initial_states import initial_states
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -109,3 +115,39 @@ def test_blocks_hold_what_parameters_and_own_terms_leave(sums: tuple[Sums, Array
         there = np.arange(READINGS) * count // READINGS == block
         expected = np.einsum("ctw,tw->wc", columns[:, there], left[there])
         np.testing.assert_allclose(found.blocks[block], expected, rtol=1e-5, atol=1e-4)
+
+
+class Heated(Simulation):
+    """A block whose temperature begins with its first reading."""
+
+    channel, unit = "rise_K", "K"
+    inputs: ClassVar = ("power_W", "rise_K")
+    parameters: ClassVar = {"resistance_K_W": Prior(0.2, 0.01, "K/W")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return a state that forgets 4 % in each step."""
+        heated = 0.04 * values["resistance_K_W"] * inputs["power_W"]
+        heated[0] = inputs["rise_K"][0]
+        return np.asarray(lfilter([1.0], [1.0, -0.96], heated, axis=0), np.float64)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the power."""
+        return {"power": inputs["power_W"]}
+
+
+def test_an_initial_state_is_each_recording_s_own() -> None:
+    """Products are those of noise to which the doubt of a first reading adds: generalised least squares."""
+    random = np.random.default_rng(5)
+    power = np.repeat(random.uniform(50, 250, 10), 30)
+    rise = Heated().predict({"power_W": power[:, None], "rise_K": np.full((300, 1), 12.0)}, {"resistance_K_W": 0.2})
+    table = {"t_s": np.arange(300.0), "power_W": power, "rise_K": rise[:, 0] + random.normal(0, 0.3, 300)}
+    recording, deviation = from_columns(table), np.array([0.3])
+    found = Found(FINDINGS, {}, deviation, 1.0, 0.1, 8.0, (), {})
+    sums, problem = sums_of(recording, Heated(), "rise_K", (), found), build_problem(recording, Heated())
+    (state,) = initial_states(problem)
+    slope = problem.tangent("resistance_K_W")[:, 0]
+    covariance = deviation**2 * np.eye(300) + np.outer(state.column, state.column)
+    weighted = deviation**2 * np.linalg.solve(covariance, slope)
+    assert sums.gram[0, 0, 0] == pytest.approx(weighted @ slope)
+    assert sums.moment[0, 0] == pytest.approx(weighted @ problem.residual[:, 0])
+    assert sums.gram[0, 0, 0] < 0.99 * (slope @ slope)
