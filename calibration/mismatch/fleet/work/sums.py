@@ -114,7 +114,7 @@ def sums_of(
     # Measured from the stated values, not from where this recording's own comparison linearised the simulation.
     residual = problem.residual + np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
     noise = NoiseModel(found.deviation, found.autocorrelation_times)
-    columns, residual = _whitened_by_initial_states(problem, columns, residual, noise)
+    _whiten_by_initial_states(problem, columns.values, residual, noise)
     gram, moment, fourth = _products(columns.values, residual)
     left = _left(columns, residual, gram, moment, noise)
     return Sums(
@@ -208,28 +208,27 @@ def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: S
     return _Columns(values, tuple(names), np.array(stds), shifts, tuple(places), tuple(own))
 
 
-def _whitened_by_initial_states(
-    problem: Problem, columns: _Columns, residual: Array, noise: NoiseModel
-) -> tuple[_Columns, Array]:
-    """Return columns and residual in which what the initial states of runs leave is as uncertain as the noise is.
+def _whiten_by_initial_states(problem: Problem, values: Array, residual: Array, noise: NoiseModel) -> None:
+    """Give each run of the recording an initial state of its own: whiten columns and residual, in place.
 
-    An initial state s, with its prior variance v, adds v s s' to the covariance of the noise 1/w. Both are multiplied
-    by the inverse square root of the sum, over that of the noise: their products are those of a fit in which each run
-    has its own initial state, which no other recording shares.
+    What an initial state changes, s, with its prior variance v, adds v s s' to the covariance I/w of the noise. The
+    inverse square root of the sum, over that of the noise, is I - (1 - 1/sqrt(1 + v w s's)) s s'/(s's): the products of
+    what it is applied to are those of a fit in which each initial state is free within its prior.
+
+    Parameters
+    ----------
+    values, residual: shape (column, time, wheel), (time, wheel)
     """
     states = tuple(initial_states(problem))
-    values, residual = columns.values.copy() if states else columns.values, residual.copy()
     for state, shown in zip(states, as_shown(problem, [state.column for state in states]), strict=True):
-        rows, wheel = state.rows, state.wheel
-        course = np.where(problem.mask[rows, wheel], shown[rows, wheel], 0.0)
+        here = state.rows, state.wheel
+        course = np.where(problem.mask[here], shown[here], 0.0)
         energy = float(course @ course)
         if energy == 0:
             continue
-        known = 1 / np.sqrt(1 + state.std**2 * noise.weights[wheel] * energy)
-        along = (1 - known) / energy * course
-        values[:, rows, wheel] -= np.outer(values[:, rows, wheel] @ course, along)
-        residual[rows, wheel] -= (residual[rows, wheel] @ course) * along
-    return replace(columns, values=values), residual
+        taken = (1 - 1 / np.sqrt(1 + state.std**2 * noise.weights[state.wheel] * energy)) / energy * course
+        values[:, *here] -= np.outer(values[:, *here] @ course, taken)
+        residual[here] -= (residual[here] @ course) * taken
 
 
 def _of_law(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
