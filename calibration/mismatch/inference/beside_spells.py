@@ -42,6 +42,8 @@ def named_beside_spells(
     all do, or the course is not known, the decision stays as it is. `grid` are the groups before any data optimised
     their shapes.
     """
+    if not decision.intermittent:
+        return decision, held_out
     found, turns = decision, []
     for _ in range(TURNS):
         if (beside := _beside_their_course(found)) is None:

@@ -25,7 +25,7 @@ def notes_on_opposite_sign(decision: Decision) -> tuple[str, ...]:
     if not decision.unnamed or decision.intermittent:
         return ()
     gained = LEAST_SHARE * (decision.whole.delta_chi2 - named.delta_chi2)
-    best = equations.largest_score(equations.gains(named.terms, list(_opposite(equations.design.groups))))
+    best = equations.gains(named.terms, list(_opposite(equations.design.groups))).largest_score()
     if best is None or equations.fit((*named.terms, best[1])).delta_chi2 - named.delta_chi2 < gained:
         return ()
     channel = equations.problem.simulation.channel

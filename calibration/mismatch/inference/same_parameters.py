@@ -198,7 +198,7 @@ def _with_change(decision: Decision, weighed: _Weighed) -> Decision:
     centre[on] = weighed.mean * of_column
     as_was = replace(nuisance, precision=precision, centre=centre).with_precision(on[-1], EXACT)
     kept = equations.with_nuisance(as_was)
-    best = kept.largest_score(kept.gains(decision.named.terms, weighed.change))
+    best = kept.gains(decision.named.terms, weighed.change).largest_score()
     if best is None:
         return decision
     name = best[1].name

@@ -24,11 +24,21 @@ class Gains:
     ----------
     groups, sets: what may enter, and on which wheels
     values: Δχ², shape (set, group); 0 where there is nothing to gain, or where the wheels may not share the group
+    penalties: what each has to gain beyond chance, in Δχ², of the same shape
     """
 
     groups: tuple[Group, ...]
     sets: tuple[tuple[int, ...], ...]
     values: Array
+    penalties: Array
+
+    def largest_score(self) -> tuple[float, Term] | None:
+        """Return the term with the largest Δχ² less penalty; None where nothing gains anything."""
+        if not self.values.any():
+            return None
+        scores = np.where(self.values > 0, self.values - self.penalties, -np.inf)
+        best = int(np.argmax(scores))
+        return float(scores.flat[best]), self.term(best)[1]
 
     def term(self, place: int) -> tuple[float, Term]:
         """Return one of them, by its place in the flattened table, with its Δχ²."""
@@ -48,10 +58,16 @@ class Gains:
         places: dict[Hashable, list[int]] = {}
         for place, group in enumerate(self.groups):
             places.setdefault(key(group), []).append(place)
-        return [Gains(tuple(self.groups[k] for k in at), self.sets, self.values[:, at]) for at in places.values()]
+        return [
+            Gains(tuple(self.groups[k] for k in at), self.sets, self.values[:, at], self.penalties[:, at])
+            for at in places.values()
+        ]
 
     def by_number_of_wheels(self) -> list[Gains]:
         """Return the gains on sets of equally many wheels together."""
         numbers = sorted({len(wheels) for wheels in self.sets})
         rows = [[row for row, wheels in enumerate(self.sets) if len(wheels) == number] for number in numbers]
-        return [Gains(self.groups, tuple(self.sets[row] for row in some), self.values[some]) for some in rows]
+        return [
+            Gains(self.groups, tuple(self.sets[row] for row in some), self.values[some], self.penalties[some])
+            for some in rows
+        ]

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.batch import Batch, Left
+from regolithd.calibration.mismatch.regression.asked import Asked
+from regolithd.calibration.mismatch.regression.batch import Left
 from regolithd.calibration.mismatch.regression.gains import Gains
 from regolithd.calibration.mismatch.regression.group import Fit, Term
 from regolithd.calibration.mismatch.regression.lasting_errors import (
@@ -22,7 +23,7 @@ from regolithd.calibration.mismatch.regression.lasting_errors import (
     has_lasting_errors,
     moments_of_errors,
 )
-from regolithd.calibration.mismatch.regression.penalties import least_penalty, penalty, visible_in_own_channel
+from regolithd.calibration.mismatch.regression.penalties import penalty
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
@@ -41,8 +42,8 @@ Single = NDArray[np.float32]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
 Derived = TypeVar("Derived")
 
-KINDS = ("all", "some", "one")
-"""Of sets of wheels that may share an effect."""
+MOST_ASKED = 4
+"""Lists of groups of which what was asked is kept (a choice: a search asks effects and smooth terms in turn)."""
 SINGULAR = 1e-10
 """Relative eigenvalue below which a direction of the normal equations counts as undetermined: rounding of float32."""
 BY_ERRORS = 4.0
@@ -213,23 +214,6 @@ class NormalEquations:
         """Return what a term has to gain beyond chance, in Δχ²."""
         return penalty(term, len(self.weights), self.thresholds)
 
-    def largest_score(self, gains: Gains) -> tuple[float, Term] | None:
-        """Return the term with the largest Δχ² less penalty; None where nothing gains anything.
-
-        No penalty is computed of what would not be the best with the least one.
-        """
-        least = [least_penalty(group, self.thresholds) for group in gains.groups]
-        at, most = np.flatnonzero(gains.values), (gains.values - least).ravel()
-        best: tuple[float, Term] | None = None
-        for place in at[np.argsort(-most[at], kind="stable")].tolist():
-            if best is not None and most[place] <= best[0]:
-                break
-            gain, term = gains.term(place)
-            score = gain - self.penalty(term)
-            if best is None or score > best[0]:
-                best = score, term
-        return best
-
     def score(self, fit: Fit) -> float:
         """Return Δχ² less the penalties; a term at frequencies of little noise counts by so much more."""
         total = fit.delta_chi2
@@ -247,51 +231,34 @@ class NormalEquations:
 
     def gains(self, given: Iterable[Term], groups: Sequence[Group]) -> Gains:
         """Return the same of these groups as a table."""
-        wanted, fitted, sets = tuple(groups), self.fit(given), tuple(self.wheel_sets)
-        at = np.array(sorted({column for group in wanted for column in group.columns}), np.int64)
-        on = np.array([[float(wheel in wheels) for wheel in self.all_wheels] for wheels in sets])
-        cross = np.tensordot(on, self._crosses(fitted.columns, at), axes=1)
+        asked, fitted = self._asked(tuple(groups)), self.fit(given)
+        at, on = asked.at, np.array([[float(wheel in wheels) for wheel in self.all_wheels] for wheels in asked.sets])
+        cross = np.tensordot(on, self._crosses_of(fitted.columns, asked), axes=1)
         moment = on @ self.moment[:, at] - fitted.coefficients @ cross
         left = Left(on, moment, cross, fitted.covariance @ cross, on @ self.energies(at))
-        may_share = self._may_share(wanted)
-        gains = np.zeros(may_share.shape)
-        for batch in self._batches(wanted, at):
-            of_sets, of_groups = np.nonzero(may_share[:, batch.which])
-            asked = batch.gains(left, of_sets, of_groups, self.thresholds.least_tolerance)
-            gains[of_sets, batch.which[of_groups]] = asked
-        for place, group in enumerate(wanted):
-            if group.own_channel is not None:
-                shown = [visible_in_own_channel(Term(group, wheels), self.thresholds) for wheels in sets]
-                gains[:, place] *= shown
-        counted = gains * np.array([group.noise_reduction for group in wanted])
-        return Gains(wanted, sets, np.where(gains > 0, counted, 0.0))
+        gains = np.zeros(asked.may_share.shape)
+        for batch in asked.batches:
+            of_sets, of_groups = np.nonzero(asked.may_share[:, batch.which])
+            found = batch.gains(left, of_sets, of_groups, self.thresholds.least_tolerance)
+            gains[of_sets, batch.which[of_groups]] = found
+        counted = np.where(gains > 0, gains * asked.noise_reductions, 0.0)
+        return Gains(asked.groups, asked.sets, counted, asked.penalties)
 
-    def _may_share(self, groups: Sequence[Group]) -> NDArray[np.bool_]:
-        """Return which sets of wheels may share which groups, shape (set, group).
+    def _asked(self, groups: tuple[Group, ...]) -> Asked:
+        """Return what does not depend on what the groups are fitted beside; the latest are kept.
 
-        The delay of an input that is put on time on some wheels changes nothing on the others, and is not theirs.
+        Groups are compared by identity.
         """
-        alone, on_some = len(self.weights) == 1, self.problem.on_time_on
-        kinds = {kind: [alone or group.may_be_shared(kind) for group in groups] for kind in KINDS}
-        shared = np.array([kinds[kind] for kind in self.wheel_sets.values()])
-        late = [on_some.get(str(group.shape.get("late")), self.all_wheels) for group in groups] if on_some else []
-        for place, wheels in enumerate(late):
-            shared[:, place] &= [set(wheels).issuperset(one) for one in self.wheel_sets]
-        return shared
+        key = tuple(map(id, groups))
+        if key not in self._latest_asked:
+            if len(self._latest_asked) == MOST_ASKED:
+                self._latest_asked.clear()
+            self._latest_asked[key] = Asked.of(self, groups)  # which keeps the groups, and so their identities
+        return self._latest_asked[key]
 
-    def _batches(self, groups: Sequence[Group], at: Index) -> list[Batch]:
-        """Return the groups in batches of equally many columns, which are among those at `at`."""
-        found = []
-        for size in sorted({len(group.columns) for group in groups}):
-            which = [place for place, group in enumerate(groups) if len(group.columns) == size]
-            columns = np.array([groups[place].columns for place in which])
-            own = np.zeros((len(self.weights), 0, size, size))
-            if size > 1:
-                products = [self.design.own_products(groups[place].columns, self.folds) for place in which]
-                own = np.stack(products, axis=1) * self.weights[:, None, None, None]
-            signs = np.array([groups[place].signs for place in which], np.float64)
-            found.append(Batch(np.array(which), np.searchsorted(at, columns), signs, own))
-        return found
+    @cached_property
+    def _latest_asked(self) -> dict[tuple[int, ...], Asked]:
+        return {}
 
     def cross(self, fitted: Columns, at: Index, wheels: tuple[int, ...]) -> Array:
         """Return sums of products of fitted columns and others that act on `wheels`, shape (fitted, other)."""
@@ -301,6 +268,15 @@ class NormalEquations:
         """Return sums of products of fitted columns, where they act, and others, shape (wheel, fitted, other)."""
         on = membership(fitted, len(self.weights)).T
         return on[:, :, None] * self.products([column for column, _ in fitted], at)
+
+    def _crosses_of(self, fitted: Columns, asked: Asked) -> Array:
+        """Return the same of what is asked; most columns of a fit were in the one before."""
+        fresh = list(dict.fromkeys(column for column, _ in fitted if column not in asked.crosses))
+        if fresh:
+            asked.crosses.update(zip(fresh, np.swapaxes(self.products(fresh, asked.at), 0, 1), strict=True))
+        on = membership(fitted, len(self.weights)).T
+        known = [asked.crosses[column] for column, _ in fitted]
+        return on[:, :, None] * np.stack(known, axis=1) if known else np.zeros((*on.shape, len(asked.at)))
 
     def own_and_complement(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:
         """Return a term's sums of products, and their Schur complement beside `given` and the free parameters."""

@@ -6,10 +6,16 @@ from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.group import Group, Term
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.regression.group import Group, Term
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.thresholds import Thresholds
+
+Array = NDArray[np.float64]
 
 
 def penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
@@ -30,11 +36,24 @@ def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
     return total
 
 
-def least_penalty(group: Group, thresholds: Thresholds) -> float:
-    """Return what the penalty of a group is at least, on any wheels: quick to compute."""
-    count = len(group.columns) if group.acting is None else 0
-    credit = 0.0 if group.own_channel is None else thresholds.largest_own_channel_credit
-    return thresholds.coefficient_penalty * float(count) + group.selection_penalty - credit
+def penalties(
+    groups: Sequence[Group], sets: Sequence[tuple[int, ...]], wheel_count: int, thresholds: Thresholds
+) -> Array:
+    """Return the penalties of groups on sets of wheels, shape (set, group).
+
+    Most groups act alike on all wheels and show in no other channel: their penalty is one of two, on all wheels and on
+    some.
+    """
+    found = np.zeros((len(sets), len(groups)))
+    all_wheels = tuple(range(wheel_count))
+    of_some = np.array([len(wheels) < wheel_count for wheels in sets])
+    for place, group in enumerate(groups):
+        if group.acting is None and group.own_channel is None:
+            on_some = penalty(Term(group, ()), wheel_count, thresholds)
+            found[:, place] = np.where(of_some, on_some, penalty(Term(group, all_wheels), wheel_count, thresholds))
+        else:
+            found[:, place] = [penalty(Term(group, wheels), wheel_count, thresholds) for wheels in sets]
+    return found
 
 
 def own_channel_credit(term: Term, thresholds: Thresholds) -> float:

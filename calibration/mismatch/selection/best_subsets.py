@@ -42,7 +42,7 @@ def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) ->
     for term in given:
         same = np.array([group.subject == term.group.subject for group in gains.groups], np.bool_)
         refused |= np.outer([not set(wheels).isdisjoint(term.wheels) for wheels in gains.sets], same)
-    return _best_of_each(equations, gains.where(~refused).families(lambda group: group.law))
+    return _best_of_each(gains.where(~refused).families(lambda group: group.law))
 
 
 def _one_wheel_shows_alone(equations: NormalEquations, gains: Gains, place: int) -> bool:
@@ -70,13 +70,13 @@ def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) 
     gains = equations.gains(given, [group for group in equations.design.groups if not group.named])
     left = gains.where([[(group.name, wheels) not in taken for group in gains.groups] for wheels in gains.sets])
     over = left.families(lambda group: (group.name, group.coupling))
-    best = _best_of_each(equations, [some for each in over for some in each.by_number_of_wheels()])
+    best = _best_of_each([some for each in over for some in each.by_number_of_wheels()])
     return [(score, term) for score, term in best if acts_forwards(equations, given, term)]
 
 
-def _best_of_each(equations: NormalEquations, families: Sequence[Gains]) -> list[Scored]:
+def _best_of_each(families: Sequence[Gains]) -> list[Scored]:
     """Return the best term of each family by Δχ² less penalty, best first."""
-    best = [equations.largest_score(gains) for gains in families]
+    best = [gains.largest_score() for gains in families]
     return sorted((each for each in best if each is not None), key=lambda scored: -scored[0])
 
 

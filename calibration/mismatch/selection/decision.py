@@ -278,7 +278,7 @@ def as_if_late(decision: Decision) -> Decision | None:
     delays = [group for group in equations.design.groups if group.named and group.name == SensorDelay.name]
     if decision.has_delay or not delays or not any(term.name in LAGGED for term in decision.unnamed):
         return None
-    best = equations.largest_score(equations.gains(decision.named.terms, delays))
+    best = equations.gains(decision.named.terms, delays).largest_score()
     if best is None:
         return None
     fit = equations.fit((*decision.named.terms, best[1]))

@@ -115,7 +115,7 @@ def _most_significant(equations: NormalEquations, most: int, least_score: float)
     ]
     terms: list[Term] = []
     while len(terms) < most:
-        found = equations.largest_score(equations.gains(terms, limited))
+        found = equations.gains(terms, limited).largest_score()
         if found is None or found[0] <= least_score:
             break
         if acts_forwards(equations, terms, found[1]):

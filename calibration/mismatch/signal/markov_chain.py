@@ -52,24 +52,27 @@ class MarkovChains:
         Parameters
         ----------
         first: log density of the first reading in each state, shape (chain, state)
-        after: log density of each reading after it, given the state before and its own, (chain, time, before, state)
+        after: log density of each reading after it, given the state before and its own, (before, state, chain, time)
         """
         largest = _largest(after)
-        total = largest.sum(axis=1)
-        product = np.exp(np.maximum(after - largest[..., None, None], SMALLEST_LOG)) * self.transitions[:, None]
-        while product.shape[1] > 1:
-            even = product.shape[1] // 2 * 2
-            pairs = product[:, 0:even:2] @ product[:, 1:even:2]
+        total = largest.sum(axis=-1)
+        # Numbers of one place in all matrices are neighbours in memory: a product of matrices of two by two is slow.
+        product = np.exp(np.maximum(after - largest, SMALLEST_LOG)) * self.transitions.transpose(1, 2, 0)[..., None]
+        while product.shape[-1] > 1:
+            even = product.shape[-1] // 2 * 2
+            one, other = product[..., 0:even:2], product[..., 1:even:2]
+            pairs = one[:, 0, None] * other[0] + one[:, 1, None] * other[1]
             size = _largest(pairs)
-            total += np.log(size).sum(axis=1)
-            product = np.concatenate((pairs / size[..., None, None], product[:, even:]), axis=1)
+            total += np.log(size).sum(axis=-1)
+            product = np.concatenate((pairs / size, product[..., even:]), axis=-1)
         top = first.max(axis=-1)
         begins = self.stationary * np.exp(first - top[:, None])
-        return np.asarray(total + top + np.log(np.einsum("ci,cij->c", begins, product[:, 0])))
+        return np.asarray(total + top + np.log(np.einsum("ci,ijc->c", begins, product[..., 0])))
 
     def second_state(self, first: Array, after: Array) -> Array:
         """Return the probability that the first chain is in its second state at each reading, given all, (time,)."""
-        steps = np.exp(after[0] - after[0].max(axis=(-2, -1))[:, None, None]) * self.transitions[0]
+        of_first = after[:, :, 0]
+        steps = np.exp(of_first - _largest(of_first)).transpose(2, 0, 1) * self.transitions[0]
         forward = np.empty((len(steps) + 1, 2))
         forward[0] = self.stationary[0] * np.exp(first[0] - first[0].max())
         for k, step in enumerate(steps):
@@ -83,7 +86,6 @@ class MarkovChains:
         return np.asarray(both[:, 1] / both.sum(axis=1))
 
 
-def _largest(pairs: Array) -> Array:
-    """Return the largest of each two by two numbers, shape (…,); `max` over axes as short as these is slow."""
-    of_rows = np.maximum(pairs[..., 0], pairs[..., 1])
-    return np.asarray(np.maximum(of_rows[..., 0], of_rows[..., 1]))
+def _largest(matrices: Array) -> Array:
+    """Return the largest number of each matrix, shape (…,), of matrices of shape (before, state, …)."""
+    return np.asarray(np.maximum.reduce(matrices.reshape(-1, *matrices.shape[2:])))

@@ -291,9 +291,9 @@ def _switching_densities(values: Array, models: Array) -> tuple[NDArray[np.bool_
     noise = _noise_variance(models)
     correlation = _noise_correlation(values, models)
     levels = np.stack((-amplitude * share, amplitude * (1 - share)), axis=-1)
-    innovation = (noise * (1 - correlation**2))[:, None, None, None]
-    means = levels[:, None, :] - correlation[:, None, None] * levels[:, :, None]
-    new = (values[1:] - correlation[:, None] * values[:-1])[:, :, None, None] - means[:, None]
+    innovation = (noise * (1 - correlation**2))[:, None]
+    means = levels.T[None] - correlation * levels.T[:, None]
+    new = values[1:] - correlation[:, None] * values[:-1] - means[..., None]
     after = -0.5 * (new**2 / innovation + np.log(innovation))
     first = -0.5 * ((values[0] - levels) ** 2 / noise[:, None] + np.log(noise[:, None]))
     possible = (_spells_variance(models) <= 1 - LEAST_NOISE) & (chains.leaving[0] < 0.5)  # else it is the usual state
@@ -308,8 +308,8 @@ def _resized_likelihood(values: Array, models: Array) -> Array:
     new = values[1:] - correlation * values[:-1]
     smaller = np.mean(new**2) / (1 - share + share * ratio**2)
     variance = np.stack((smaller, smaller * ratio**2), axis=-1)
-    of_state = -0.5 * (new[:, None] ** 2 / variance[:, None] + np.log(variance[:, None]))
-    after = np.broadcast_to(of_state[:, :, None], (*of_state.shape[:2], 2, 2))
+    of_state = -0.5 * (new**2 / variance.T[..., None] + np.log(variance.T[..., None]))
+    after = np.broadcast_to(of_state, (2, *of_state.shape))
     first = -0.5 * np.full((len(models), 2), values[0] ** 2)
     possible = chains.leaving[0] < 0.5  # else it is the usual state
     return np.where(possible, chains.log_likelihood(first, after), -np.inf)

@@ -73,7 +73,7 @@ def test_information_and_prior_make_the_fit() -> None:
     """Of the free parameters of one channel beside curves."""
     equations = equations_of(problem_of(table(noise=1.0)))
     nuisance = equations.nuisance
-    term = equations.largest_score(equations.gains((), equations.design.groups))
+    term = equations.gains((), equations.design.groups).largest_score()
     terms = (term[1],) if term else ()
     fit, kept = equations.fit(terms), list(range(len(nuisance.columns)))
     matrix, moment = equations.information(terms, kept)

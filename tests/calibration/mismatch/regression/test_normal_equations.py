@@ -94,8 +94,8 @@ def test_the_largest_score_is_that_of_all_terms(equations: NormalEquations) -> N
     """Of terms in any order, and none of none."""
     gain, term = max(equations.further(()), key=lambda pair: pair[0] - equations.penalty(pair[1]))
     found = equations.gains((), equations.design.groups[::-1])
-    assert equations.largest_score(found) == (pytest.approx(gain - equations.penalty(term)), term)
-    assert equations.largest_score(equations.gains((), ())) is None
+    assert found.largest_score() == (pytest.approx(gain - equations.penalty(term)), term)
+    assert equations.gains((), ()).largest_score() is None
 
 
 def test_a_wrong_sign_gains_nothing() -> None:

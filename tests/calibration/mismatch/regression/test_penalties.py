@@ -11,8 +11,8 @@ from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.penalties import (
     full_penalty,
-    least_penalty,
     own_channel_credit,
+    penalties,
     penalty,
     visible_in_own_channel,
 )
@@ -42,14 +42,19 @@ def test_columns_that_do_nothing_on_a_wheel_cost_nothing_there() -> None:
     assert first - second == pytest.approx(2)
 
 
-def test_the_least_penalty_is_not_more_than_any() -> None:
-    """On all wheels or on one, with columns that act on some of them or on all."""
+def test_the_table_of_penalties_is_that_of_each_term() -> None:
+    """On all wheels or on one, with columns that act on some of them or on all, and with a channel of its own."""
     acting = np.array([[True, False], [True, False], [False, True]])
-    for group in (GROUP, replace(GROUP, acting=acting), replace(GROUP, acting=acting, sharing=("one",))):
-        assert least_penalty(group, THRESHOLDS) >= group.selection_penalty
-        for wheels in ((0, 1), (0,), (1,)):
-            assert least_penalty(group, THRESHOLDS) <= full_penalty(Term(group, wheels), 2, THRESHOLDS)
-    assert least_penalty(GROUP, THRESHOLDS) == full_penalty(Term(GROUP, (0, 1)), 2, THRESHOLDS)
+    groups = (
+        GROUP,
+        replace(GROUP, sharing=("one",)),
+        replace(GROUP, acting=acting),
+        replace(GROUP, acting=acting, sharing=("one",)),
+        replace(GROUP, own_channel=(np.array([40.0, 1e4]), np.ones(2))),
+    )
+    sets = ((0,), (1,), (0, 1))
+    each = [[penalty(Term(group, wheels), 2, THRESHOLDS) for group in groups] for wheels in sets]
+    np.testing.assert_array_equal(penalties(groups, sets, 2, THRESHOLDS), each)
 
 
 @pytest.mark.parametrize(("gain", "credit", "visible"), [(10.0, 5.0, False), (40.0, 20.0, True), (1e4, 300.0, True)])
@@ -60,7 +65,6 @@ def test_a_fault_s_own_channel_credits_half_of_its_gain(gain: float, credit: flo
     assert own_channel_credit(term, THRESHOLDS) == credit
     assert visible_in_own_channel(term, THRESHOLDS) is visible
     assert penalty(term, 2, THRESHOLDS) == full_penalty(term, 2, THRESHOLDS) - credit
-    assert least_penalty(group, THRESHOLDS) <= penalty(term, 2, THRESHOLDS)
 
 
 def test_what_has_no_other_channel_is_visible_and_gets_no_credit() -> None:

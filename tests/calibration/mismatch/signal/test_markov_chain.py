@@ -15,14 +15,14 @@ READINGS = 7
 def densities(seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return log densities of the first reading and of the others, of one chain."""
     random = np.random.default_rng(seed)
-    return random.normal(size=(1, 2)), random.normal(size=(1, READINGS - 1, 2, 2))
+    return random.normal(size=(1, 2)), random.normal(size=(2, 2, 1, READINGS - 1))
 
 
 def of_sequence(chain: MarkovChains, states: tuple[int, ...], first: np.ndarray, after: np.ndarray) -> float:
     """Return the likelihood of the readings together with one sequence of states."""
     found = chain.stationary[0, states[0]] * np.exp(first[0, states[0]])
     for k, (before, now) in enumerate(pairwise(states)):
-        found *= chain.transitions[0, before, now] * np.exp(after[0, k, before, now])
+        found *= chain.transitions[0, before, now] * np.exp(after[before, now, 0, k])
     return float(found)
 
 
@@ -47,6 +47,6 @@ def test_chains_are_stationary() -> None:
 def test_impossible_readings_are_no_underflow() -> None:
     """Thousands of readings far from either level have a finite likelihood."""
     chain = MarkovChains(np.array([0.3]), np.array([4.0]))
-    after = np.full((1, 3000, 2, 2), -1e5)
-    after[:, :, 0, 0] = 0.0
+    after = np.full((2, 2, 1, 3000), -1e5)
+    after[0, 0] = 0.0
     assert np.isfinite(chain.log_likelihood(np.array([[-1e4, 0.0]]), after)).all()
