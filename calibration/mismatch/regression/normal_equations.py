@@ -42,6 +42,8 @@ Single = NDArray[np.float32]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
 Derived = TypeVar("Derived")
 
+MOST_SOLVED = 512
+"""Fits that are kept (a choice: they take about a MiB)."""
 MOST_ASKED = 4
 """Lists of groups of which what was asked is kept (a choice: a search asks effects and smooth terms in turn)."""
 SINGULAR = 1e-10
@@ -139,10 +141,23 @@ class NormalEquations:
         """Fit terms and free parameters together."""
         terms = tuple(terms)
         columns = self.columns_of(terms)
-        matrix, moment = self._normal(columns)
-        inverse = pseudo_inverse(matrix, SINGULAR)
-        solved = inverse @ moment
-        return Fit(terms, columns, solved, inverse, float(moment @ solved) - self._explained_by_parameters)
+        return Fit(terms, columns, *self._solved(columns))
+
+    def _solved(self, columns: Columns) -> tuple[Array, Array, float]:
+        """Return coefficients, covariance and Δχ² of these columns; the latest are kept: most are asked for again."""
+        if columns not in self._latest_solved:
+            if len(self._latest_solved) == MOST_SOLVED:
+                del self._latest_solved[next(iter(self._latest_solved))]
+            matrix, moment = self._normal(columns)
+            inverse = pseudo_inverse(matrix, SINGULAR)
+            solved = inverse @ moment
+            explained = float(moment @ solved) - self._explained_by_parameters
+            self._latest_solved[columns] = solved, inverse, explained
+        return self._latest_solved[columns]
+
+    @cached_property
+    def _latest_solved(self) -> dict[Columns, tuple[Array, Array, float]]:
+        return {}
 
     def lately(self, derive: Callable[[NormalEquations, Sequence[Term]], Derived], terms: Sequence[Term]) -> Derived:
         """Return what is derived from terms beside these equations; the latest is kept: much is tried beside the same.
