@@ -98,3 +98,25 @@ def delta_chi2_of_groups(
     scaled = np.where(kept, along / np.where(kept, values, 1.0), 0.0)
     coefficients = np.einsum("gij,gj->gi", vectors, scaled)
     return np.where(np.any(signs * coefficients < 0, axis=1), 0.0, np.einsum("gi,gi->g", along, scaled))
+
+
+def with_further_readings(gram: Array, moment: Array, reductions: Array, singular: float) -> tuple[Array, Array]:
+    """Return sums of products, and moments, with what columns know at frequencies of little noise.
+
+    What is beyond the long-run variance's weight is that of further readings, of which these columns' span alone is
+    known: all columns, and the residual, count there by their projection on it. So what other columns explain is no
+    more evidence for these than in a fit by one weight.
+
+    Parameters
+    ----------
+    gram, moment: weighted by the long-run variance, shape (column, column), (column,)
+    reductions: long-run variance of the noise over that at the frequencies of each column, shape (column,)
+    singular: relative eigenvalue below which a direction of the columns' span counts as undetermined
+    """
+    span = np.flatnonzero((reductions > 1) & (np.diag(gram) > 0))
+    if not span.size:
+        return gram, moment
+    further = np.sqrt(reductions[span] - 1)
+    inverse = pseudo_inverse(gram[np.ix_(span, span)], singular)
+    along = further[:, None] * gram[span]
+    return gram + along.T @ inverse @ along, moment + along.T @ inverse @ (further * moment[span])

@@ -43,14 +43,14 @@ def entry_threshold(equations: FleetEquations, places: Sequence[Place]) -> float
 
 
 def _drawn(equations: FleetEquations, generator: np.random.Generator) -> Array:
-    """Return moments with the signs of all blocks drawn anew, shape (draw, recording, wheel, column)."""
+    """Return moments with the signs of all blocks drawn anew, by what is known, (draw, recording, wheel, column)."""
     drawn = np.zeros((BATCH, *equations.moment.shape))
     for i, sums in enumerate(equations.sums):
         own, fleet = column_map(sums, equations.tangents, equations.groups)
         at = [equations.wheels.index(name) for name in sums.wheels]
         signs = generator.choice([-1.0, 1.0], (BATCH, *sums.blocks.shape[:2]))
         flipped = np.einsum("dbw,bwc->dwc", signs, sums.blocks[:, :, own], optimize=True)
-        drawn[:, i][:, np.array(at)[:, None], np.array(fleet)[None, :]] = flipped
+        drawn[:, i][:, np.array(at)[:, None], np.array(fleet)[None, :]] = flipped * equations.reductions[i, fleet]
     return drawn
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.schur import held_by_last, pseudo_inverse
+from regolithd.calibration.mismatch.regression.schur import held_by_last, pseudo_inverse, with_further_readings
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -107,8 +107,8 @@ class FleetEquations:
     groups: the candidates of the grid; their columns come after the tangents
     level: whose the parameters are
     gram, moment: weighted, shape (recording, wheel, column, column), (recording, wheel, column)
-    reductions: long-run variance of the noise over that at the frequencies of each column, shape (recording, column):
-        products of such columns, and their moments, are weighted by so much more
+    reductions: long-run variance of the noise over that at the frequencies of each column, shape (recording, column);
+        what such columns know is weighted by so much more (`with_further_readings`)
     released: places, among the coefficients, of parameters whose priors are widened as far as a wrong statement goes
     """
 
@@ -214,28 +214,30 @@ class FleetEquations:
         for i in np.flatnonzero(used):
             acting = np.flatnonzero(by[:, i].any(axis=1))
             of = at[acting]
-            part = np.zeros((len(acting), len(acting)))
+            part, of_part = np.zeros((len(acting), len(acting))), np.zeros(len(acting))
             for w in range(len(self.wheels)):
                 factor = by[acting, i, w]
-                part += np.outer(factor, factor) * self.gram[i, w][np.ix_(of, of)]
-                moment[acting] += factor * self.moment[i, w, of]
+                products, own = with_further_readings(*self._acting(i, w, of, factor), self.reductions[i, of], SINGULAR)
+                part += products
+                of_part += own
             matrix[np.ix_(acting, acting)] += part
+            moment[acting] += of_part
         return matrix, moment
 
-    @cached_property
-    def _counted(self) -> Array:
-        """By how much more products of columns are weighted, shape (recording, column, column).
+    def _acting(self, recording: int, wheel: int, at: NDArray[np.int64], factor: Array) -> tuple[Array, Array]:
+        """Return the weighted sums of products of columns with these factors, with each other and the residual."""
+        gram = self.gram[recording, wheel][np.ix_(at, at)]
+        return np.outer(factor, factor) * gram, factor * self.moment[recording, wheel, at]
 
-        What is beyond the long-run variance's weight is that of further readings, of which these columns know alone.
-        """
-        further = np.sqrt(self.reductions - 1)
-        return np.asarray(1 + further[:, :, None] * further[:, None, :])
+    def known(self, recording: int, wheel: int, at: Sequence[int] | NDArray[np.int64]) -> Array:
+        """Return the sums of products of columns by what they know, shape (column, column): weighted by reductions."""
+        root = np.sqrt(self.reductions[recording, list(at)])
+        return np.asarray(np.outer(root, root) * self.gram[recording, wheel][np.ix_(list(at), list(at))])
 
     def products(self, recording: int, wheel: int, at: Sequence[int] | NDArray[np.int64]) -> Array:
         """Return the sums of products of these columns, unweighted, shape (column, column)."""
-        places = np.ix_(list(at), list(at))
         weight = max(float(self.weights[recording, wheel]), 1e-300)
-        return np.asarray(self.gram[recording, wheel][places] / self._counted[recording][places] / weight)
+        return np.asarray(self.gram[recording, wheel][np.ix_(list(at), list(at))] / weight)
 
     def beside(self, terms: Iterable[tuple[int, int]]) -> FleetEquations:
         """Return the equations in which these terms, recordings and places in their `own`, take up what they can.
@@ -251,9 +253,8 @@ class FleetEquations:
                 k, weight, products = self.wheels.index(name), sums.weights[w], sums.gram[w]
                 inverse = pseudo_inverse(products[np.ix_(free, free)], SINGULAR)
                 cross = products[np.ix_(own, free)] @ inverse
-                along = self._counted[i][np.ix_(fleet, fleet)] * (cross @ products[np.ix_(free, own)])
-                gram[i, k][np.ix_(fleet, fleet)] -= weight * along
-                moment[i, k][fleet] -= weight * self.reductions[i, fleet] * (cross @ sums.moment[w, free])
+                gram[i, k][np.ix_(fleet, fleet)] -= weight * (cross @ products[np.ix_(free, own)])
+                moment[i, k][fleet] -= weight * (cross @ sums.moment[w, free])
                 gone = np.diag(gram[i, k]) <= SINGULAR * np.diag(self.gram[i, k])
                 gram[i, k][gone], gram[i, k][:, gone], moment[i, k][gone] = 0.0, 0.0, 0.0
         return replace(self, gram=gram, moment=moment)
@@ -276,26 +277,37 @@ class FleetEquations:
 
     def _with_own(self, fit: FleetFit, recording: int, free: Sequence[int]) -> tuple[Array, Array, Array]:
         """Return the energy of a recording's own columns, their products with a fit's columns, and their moment."""
-        sums = self.sums[recording]
-        energy, own = np.zeros((len(free), len(free))), np.zeros(len(free))
-        cross = np.zeros((len(fit.columns), len(free)))
+        sums, count = self.sums[recording], len(fit.columns)
+        energy, cross, own = np.zeros((len(free), len(free))), np.zeros((count, len(free))), np.zeros(len(free))
         places, fleet = column_map(sums, self.tangents, self.groups)
+        reductions = np.append(self.reductions[recording, fit.columns], np.ones(len(free)))
         for w, name in enumerate(sums.wheels):
-            energy += sums.weights[w] * sums.gram[w][np.ix_(free, free)]
-            own += sums.weights[w] * sums.moment[w, list(free)]
+            k = self.wheels.index(name)
             products = np.zeros((self.gram.shape[-1], len(free)))
             products[fleet] = sums.weights[w] * sums.gram[w][np.ix_(places, free)]
-            cross += fit.factors[:, recording, self.wheels.index(name), None] * products[fit.columns]
+            factor = fit.factors[:, recording, k]
+            of_fit, moment = self._acting(recording, k, fit.columns, factor)
+            beside = factor[:, None] * products[fit.columns]
+            of_free = sums.weights[w] * sums.gram[w][np.ix_(free, free)]
+            whole, moment = with_further_readings(
+                np.block([[of_fit, beside], [beside.T, of_free]]),
+                np.append(moment, sums.weights[w] * sums.moment[w, list(free)]),
+                reductions,
+                SINGULAR,
+            )
+            energy += whole[count:, count:]
+            cross += whole[:count, count:]
+            own += moment[count:]
         return energy, cross, own
 
     def left_moment(self, fit: FleetFit) -> Array:
-        """Return the moments of all columns with what a fit leaves, shape (recording, wheel, column)."""
+        """Return the moments of all columns with what a fit leaves, by what they know, (recording, wheel, column)."""
         left = self.moment.copy()
         for i in range(self.count):
             for w in range(len(self.wheels)):
                 sizes = fit.coefficients * fit.factors[:, i, w]
                 left[i, w] -= sizes @ self.gram[i, w][fit.columns]
-        return left
+        return np.asarray(left * self.reductions[:, None])
 
     def squares(self, fit: FleetFit) -> Array:
         """Return the sum of squares that a fit leaves, unweighted, shape (recording, wheel)."""
@@ -305,7 +317,7 @@ class FleetEquations:
                 k = self.wheels.index(name)
                 acting = np.flatnonzero(fit.factors[:, i, k])
                 sizes, at = (fit.coefficients * fit.factors[:, i, k])[acting], fit.columns[acting]
-                moment = self.moment[i, k, at] / self.reductions[i, at] / sums.weights[w]
+                moment = self.moment[i, k, at] / sums.weights[w]
                 total[i, k] = sums.energy[w] - 2 * sizes @ moment + sizes @ self.products(i, k, at) @ sizes
         return total
 
@@ -361,9 +373,6 @@ def fleet_equations(
             weights[i, k] = each.weights[w]
             gram[i, k][np.ix_(fleet, fleet)] = each.weights[w] * each.gram[w][np.ix_(own, own)]
             moment[i, k][fleet] = each.weights[w] * each.moment[w, own]
-    further = np.sqrt(reductions - 1)
-    gram *= 1 + (further[:, :, None] * further[:, None, :])[:, None]
-    moment *= reductions[:, None]
     return FleetEquations(
         sums=tuple(sums),
         rover=np.array(rover, np.int64),

@@ -185,7 +185,8 @@ def _own_gains(equations: FleetEquations, left: Array, place: Place, group: Grid
         here = np.isin(equations.rover[list(place.recordings)], rovers)
         recordings = np.array(place.recordings)[here]
         moment = by[:, here] @ left[recordings, wheel][:, at]
-        own = np.einsum("icd,mi->mcd", equations.gram[recordings, wheel][:, at][:, :, at], by[:, here] ** 2)
+        energies = np.array([equations.known(i, wheel, at) for i in recordings.tolist()])
+        own = np.einsum("icd,mi->mcd", energies, by[:, here] ** 2)
         inverse = np.linalg.pinv(own, rcond=THRESHOLDS.least_tolerance, hermitian=True)
         total += np.einsum("mc,mcd,md->m", moment, inverse, moment)
     return total
@@ -198,8 +199,8 @@ class Summed:
     Attributes
     ----------
     left: shape (recording, column)
-    own: gram, shape (recording, column, column)
-    cross: of fitted coefficients with all columns, shape (coefficient, recording, column)
+    own: sums of products by what columns know, shape (recording, column, column)
+    cross: the same of fitted coefficients with all columns, shape (coefficient, recording, column)
     inverse: of the fitted coefficients that act here
     """
 
@@ -235,10 +236,13 @@ def summed_over(equations: FleetEquations, fit: FleetFit, left: Array, place: Pl
     cross = np.zeros((len(acting), len(at), equations.gram.shape[-1]))
     own = np.zeros((len(at), *equations.gram.shape[-2:]))
     for place_of, i in enumerate(at):
+        root = np.sqrt(equations.reductions[i])
         for w in on:
-            factor = fit.factors[acting, i, w]
+            factor = fit.factors[acting, i, w] * root[fit.columns[acting]]
             cross[:, place_of] += factor[:, None] * equations.gram[i, w][fit.columns[acting]]
             own[place_of] += equations.gram[i, w]
+        cross[:, place_of] *= root
+        own[place_of] *= np.outer(root, root)
     return Summed(
         left=left[at][:, on].sum(axis=1), own=own, cross=cross, inverse=fit.covariance[np.ix_(acting, acting)]
     )

@@ -47,7 +47,7 @@ def estimates_of(equations: FleetEquations, fit: FleetFit, index: int) -> list[t
     for i in equations.of_rovers(term.units.rovers):
         for (rovers, on), size, factor in zip(term.parts, sizes, factors, strict=True):
             wheels = tuple(w for w in on if equations.counts[i, w] > 0)
-            energy = sum(float(size @ equations.gram[i, w][np.ix_(at, at)] @ size) for w in wheels)
+            energy = sum(float(size @ equations.known(i, w, at) @ size) for w in wheels)
             told = _told_size(term.group, size)
             if equations.rover[i] in rovers and energy > 0 and told:
                 by = float(np.max(factor[i]))

@@ -67,7 +67,7 @@ def _smallest(chooser: Chooser, others: Sequence[FleetTerm], term: FleetTerm) ->
     fit = equations.fit((*others, term))
     at, span, factors = list(term.group.columns), fit.spans[-1], equations.factors(term)
     variances = np.maximum(np.diag(fit.covariance)[span].reshape(-1, len(at)).max(axis=1), 1e-300)
-    energies = np.diagonal(equations.gram, axis1=2, axis2=3)[:, :, at]
+    energies = np.diagonal(equations.gram, axis1=2, axis2=3)[:, :, at] * equations.reductions[:, None, at]
     acts = np.einsum("piw,iwc->pc", factors**2, energies).max(axis=1)
     told = 1 / variances > DETERMINED * acts
     if not told.any():
