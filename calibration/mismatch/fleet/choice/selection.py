@@ -42,25 +42,49 @@ class Chooser:
         """Return the fit of all effects that may be named.
 
         They are searched twice, with and without effects of several rovers: of different laws on different rovers, one
-        that is none of theirs may gain most over all.
+        that is none of theirs may gain most over all. Each search begins with one law and then with another: of two
+        laws that act everywhere, a third that is a little of both may gain most, and leave too little for either.
         """
         alone = [place for place in self.places if len(place.units.rovers) == 1]
         searches = [self.places, alone] if 0 < len(alone) < len(self.places) else [self.places]
-        found = [self._grown(places) for places in searches]
+        found = [self._grown(start, places) for places in searches for start in self._starts(places)]
         return self._confirmed(max(found, key=self._evidence))
 
     def _evidence(self, fit: FleetFit) -> float:
         """Return the score of a fit less what its effects had to gain to enter."""
         return score(self.equations, fit) - self.entry_threshold * len(fit.terms)
 
-    def _grown(self, places: Sequence[Place]) -> FleetFit:
-        """Return the fit of effects that were chosen one after the other, each searched anew beside the others."""
-        fit = self.equations.fit(())
+    def _starts(self, places: Sequence[Place]) -> list[FleetFit]:
+        """Return the fits of one law each that may be named, in its best place, the best first; or that of none."""
+        nothing = self.equations.fit(())
+        starts: dict[str, FleetFit] = {}
+        for gained, term in further(self.equations, nothing, places):
+            if gained <= self.entry_threshold or len(starts) == STARTS:
+                break
+            if term.name not in starts and self.acceptable(fit := self.equations.fit((term,))):
+                starts[term.name] = fit
+        return list(starts.values()) or [nothing]
+
+    def _grown(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit:
+        """Return the fit with further effects, chosen one after the other, each searched anew beside the others."""
+        start = fit
         while len(fit.terms) < MOST_TERMS:
             best = self._best_further(fit, places)
             if best is None:
                 break
             fit = self._searched_anew(best, places)
+        # A law by itself would be exchanged for the best one, with which another search begins.
+        return self._that_gain_enough(self._searched_anew(fit, places) if fit is start else fit)
+
+    def _that_gain_enough(self, fit: FleetFit) -> FleetFit:
+        """Return the fit without effects that gain too little beside those that were chosen after them."""
+        index = 0
+        while index < len(fit.terms):
+            less = self.equations.fit(without(fit, index))
+            if self._worthwhile(less, self.equations.fit((*less.terms, fit.terms[index]))):
+                index += 1
+            else:
+                fit, index = less, 0
         return fit
 
     def _best_further(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit | None:
@@ -189,6 +213,8 @@ def _one_shape(one: FleetTerm, other: FleetTerm) -> bool:
     return apart or one.name != other.name or one.group == other.group
 
 
+STARTS = 5
+"""Laws with which a search begins, at most (a choice: computing time; the best two or three differ by a tenth)."""
 FURTHER_SHARE = 0.05
 """Share of the Δχ² of the effects on the same rovers that a further one must gain (a choice: a law of the fleet has one
 of the grid's shapes, and the best four of a cold gearbox's twelve differ by one to four percent)."""
