@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
 
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.fleet.choice.courses import Course
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetFit, Level
+    from regolithd.calibration.mismatch.fleet.choice.equations import Level
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 
 Array = NDArray[np.float64]
 

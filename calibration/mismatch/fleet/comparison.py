@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows, write_catalogue
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
 from regolithd.calibration.mismatch.fleet.choice.earned import earned
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, Level, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
     from regolithd.calibration.mismatch.fleet.work.store import Store
     from regolithd.calibration.mismatch.result import Comparison

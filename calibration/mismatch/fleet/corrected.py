@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
     from regolithd.calibration.mismatch.fleet.told.findings import Chosen
     from regolithd.calibration.mismatch.simulation.simulation import Simulation

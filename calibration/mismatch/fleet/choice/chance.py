@@ -11,16 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, column_map
+from regolithd.calibration.mismatch.fleet.choice.equations import column_map
 from regolithd.calibration.mismatch.fleet.choice.search import course_cost, may_share, penalty, summed_over
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, schur_diagonal
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.search import Place
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 
 Array = NDArray[np.float64]
 

@@ -24,9 +24,10 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.work.found import Found
 
 Own = tuple[int, int]

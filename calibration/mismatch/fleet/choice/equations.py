@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 from regolithd.calibration.mismatch.regression.schur import held_by_last, pseudo_inverse, with_further_readings
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.courses import Course
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
     from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
     from regolithd.calibration.mismatch.fleet.work.sums import Sums
 
@@ -29,68 +30,6 @@ Level = Literal["shared", "rover", "recording"]
 """Whose a parameter of the simulation is: one value for the fleet, for each rover, or for each recording."""
 SINGULAR = 1e-12
 """Relative eigenvalue or energy below which a direction counts as undetermined: rounding of the sums."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """Wheels of rovers that share an effect.
-
-    Attributes
-    ----------
-    rovers, wheels: indices
-    sharing: whether these are all wheels of each rover, some, or one
-    each: whether each rover has a size of its own
-    """
-
-    rovers: tuple[int, ...]
-    wheels: tuple[int, ...]
-    sharing: Literal["all", "some", "one"] = "all"
-    each: bool = False
-
-
-@dataclass(frozen=True)
-class FleetTerm:
-    """A candidate in one shape, on some wheels of some rovers, with its course over the recordings."""
-
-    group: GridGroup
-    units: Units
-    course: Course
-
-    @property
-    def name(self) -> str:
-        """The candidate's."""
-        return self.group.candidate.name
-
-    @property
-    def parts(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
-        """Rovers and wheels that share each of its sizes."""
-        rovers, wheels = self.units.rovers, self.units.wheels
-        if self.group.of_wheels:
-            return tuple(((rover,), (wheel,)) for rover in rovers for wheel in wheels)
-        return tuple(((rover,), wheels) for rover in rovers) if self.units.each else ((rovers, wheels),)
-
-
-@dataclass(frozen=True, eq=False)
-class FleetFit:
-    """Terms fitted together with the free parameters.
-
-    Attributes
-    ----------
-    terms: what was fitted
-    columns: of every coefficient, the free parameters' first, shape (coefficient,)
-    factors: of every coefficient, shape (coefficient, recording, wheel)
-    coefficients, covariance: in physical units
-    delta_chi2: below the free parameters alone
-    spans: the coefficients of each term
-    """
-
-    terms: tuple[FleetTerm, ...]
-    columns: NDArray[np.int64]
-    factors: Array
-    coefficients: Array
-    covariance: Array
-    delta_chi2: float
-    spans: tuple[slice, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +119,7 @@ class FleetEquations:
     def fit(self, terms: Iterable[FleetTerm], used: Array | None = None) -> FleetFit:
         """Fit terms and free parameters together, to all recordings or those with `used` (recording,) of 1."""
         terms = tuple(terms)
-        columns, factors, precision = self.parameter_factors
+        columns, factors, _ = self.parameter_factors
         base, spans = len(columns), []
         parts, places = [factors], [columns]
         for term in terms:
@@ -190,20 +129,37 @@ class FleetEquations:
                 places.append(np.array(term.group.columns, np.int64))
             spans.append(slice(before, before + len(sizes) * len(term.group.columns)))
         at, by = np.concatenate(places), np.concatenate(parts)
-        matrix, moment = self._normal(at, by, np.ones(self.count) if used is None else used)
-        matrix[range(base), range(base)] += precision
+        used = np.ones(self.count) if used is None else used
+        matrix, moment = self._with_priors(at, by, used)
         inverse = pseudo_inverse(matrix, SINGULAR)
         solved = inverse @ moment
         gained = float(moment @ solved)
+        if (rest := self._counting_alike(at, by)).sum() < len(at):
+            gained -= _explained(matrix[np.ix_(rest, rest)], moment[rest])
+            matrix, moment = self._with_priors(at[rest], by[rest], used)
+            gained += _explained(matrix, moment)
         if base:
             gained -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
         return FleetFit(terms, at, by, solved, inverse, gained, tuple(spans))
 
+    def _counting_alike(self, at: NDArray[np.int64], by: Array) -> NDArray[np.bool_]:
+        """Return which coefficients know no more than the long-run variance says, shape (coefficient,).
+
+        What these explain of the further readings of others is no gain: without the others it is not asked for.
+        """
+        return np.asarray(~((self.reductions[:, at].T > 1) & by.any(axis=2)).any(axis=1))
+
+    def _with_priors(self, at: NDArray[np.int64], by: Array, used: Array) -> tuple[Array, Array]:
+        """Return matrix and moment of the normal equations, the parameters' priors included."""
+        matrix, moment = self._normal(at, by, used)
+        precision = self.parameter_factors[2]
+        matrix[range(len(precision)), range(len(precision))] += precision
+        return matrix, moment
+
     def held_by_last(self, fit: FleetFit, index: int, with_last: FleetFit, used: Array) -> float:
         """Return the Δχ² that the last term of a larger fit has in common with one of a fit, beside the parameters."""
         base, last = len(self.parameter_factors[0]), with_last.spans[-1].start
-        matrix, _ = self._normal(with_last.columns, with_last.factors, used)
-        matrix[range(base), range(base)] += self.parameter_factors[2]
+        matrix, _ = self._with_priors(with_last.columns, with_last.factors, used)
         size = np.zeros(last - base)
         size[fit.spans[index].start - base : fit.spans[index].stop - base] = fit.coefficients[fit.spans[index]]
         return held_by_last(matrix, base, last, size, SINGULAR)
@@ -264,30 +220,41 @@ class FleetEquations:
 
         A term of one recording, by recording and place, has the same coefficients on all of its wheels.
         """
-        base, count = len(self.parameter_factors[0]), len(fit.columns)
-        matrix, moment = self._normal(fit.columns, fit.factors, np.ones(self.count))
-        matrix[range(base), range(base)] += self.parameter_factors[2]
-        for recording, free in _columns_by_recording(self.sums, beside).items():
-            energy, cross, own = self._with_own(fit, recording, free)
+        terms, rest = list(beside), self._counting_alike(fit.columns, fit.factors)
+        matrix, moment = self._with_own(fit.columns, fit.factors, terms)
+        total = _explained(matrix, moment)
+        if not rest.all():
+            kept = np.append(rest, np.ones(len(moment) - len(rest), np.bool_))
+            total -= _explained(matrix[np.ix_(kept, kept)], moment[kept])
+            total += _explained(*self._with_own(fit.columns[rest], fit.factors[rest], terms))
+        return total
+
+    def _with_own(self, at: NDArray[np.int64], by: Array, terms: Iterable[tuple[int, int]]) -> tuple[Array, Array]:
+        """Return matrix and moment of coefficients, and of these terms of `own`, the priors included."""
+        matrix, moment = self._with_priors(at, by, np.ones(self.count))
+        for recording, free in _columns_by_recording(self.sums, terms).items():
+            energy, cross, own = self._own_of(at, by, recording, free)
             size = len(matrix)
             matrix = np.pad(matrix, (0, len(free)))
-            matrix[size:, size:], matrix[size:, :count], matrix[:count, size:] = energy, cross.T, cross
+            matrix[size:, size:], matrix[size:, : len(at)], matrix[: len(at), size:] = energy, cross.T, cross
             moment = np.append(moment, own)
-        return float(moment @ pseudo_inverse(matrix, SINGULAR) @ moment)
+        return matrix, moment
 
-    def _with_own(self, fit: FleetFit, recording: int, free: Sequence[int]) -> tuple[Array, Array, Array]:
+    def _own_of(
+        self, at: NDArray[np.int64], by: Array, recording: int, free: Sequence[int]
+    ) -> tuple[Array, Array, Array]:
         """Return the energy of a recording's own columns, their products with a fit's columns, and their moment."""
-        sums, count = self.sums[recording], len(fit.columns)
+        sums, count = self.sums[recording], len(at)
         energy, cross, own = np.zeros((len(free), len(free))), np.zeros((count, len(free))), np.zeros(len(free))
         places, fleet = column_map(sums, self.tangents, self.groups)
-        reductions = np.append(self.reductions[recording, fit.columns], np.ones(len(free)))
+        reductions = np.append(self.reductions[recording, at], np.ones(len(free)))
         for w, name in enumerate(sums.wheels):
             k = self.wheels.index(name)
             products = np.zeros((self.gram.shape[-1], len(free)))
             products[fleet] = sums.weights[w] * sums.gram[w][np.ix_(places, free)]
-            factor = fit.factors[:, recording, k]
-            of_fit, moment = self._acting(recording, k, fit.columns, factor)
-            beside = factor[:, None] * products[fit.columns]
+            factor = by[:, recording, k]
+            of_fit, moment = self._acting(recording, k, at, factor)
+            beside = factor[:, None] * products[at]
             of_free = sums.weights[w] * sums.gram[w][np.ix_(free, free)]
             whole, moment = with_further_readings(
                 np.block([[of_fit, beside], [beside.T, of_free]]),
@@ -332,6 +299,11 @@ class FleetEquations:
         for i, sums in enumerate(self.sums):
             found[i, [self.wheels.index(name) for name in sums.wheels]] = values[i]
         return found
+
+
+def _explained(matrix: Array, moment: Array) -> float:
+    """Return by how much the coefficients of normal equations lower χ²."""
+    return float(moment @ pseudo_inverse(matrix, SINGULAR) @ moment)
 
 
 def _columns_by_recording(sums: Sequence[Sums], terms: Iterable[tuple[int, int]]) -> dict[int, list[int]]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.fleet.choice.selection import folds_of, without
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.answer import Effect, Unexplained
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
     from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 
 Array = NDArray[np.float64]

@@ -17,7 +17,8 @@ from regolithd.calibration.mismatch.inference.joint_parameters import Informatio
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
     from regolithd.calibration.mismatch.fleet.work.found import Found
     from regolithd.calibration.mismatch.problem.prior import Prior
 

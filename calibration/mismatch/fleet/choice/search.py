@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course, courses_over
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, delta_chi2_together
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
     from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 
 Array = NDArray[np.float64]

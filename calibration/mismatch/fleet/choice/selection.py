@@ -17,8 +17,9 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.search import Place
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ from regolithd.calibration.mismatch.fleet.told.sizes import told_sizes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
     from regolithd.calibration.mismatch.fleet.work.found import Found
     from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 

@@ -36,9 +36,10 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from regolithd.calibration.mismatch.answer import Effect, Verdict
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.work.found import Found
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 

@@ -19,8 +19,9 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Sensitivity
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
 from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
 from regolithd.calibration.mismatch.inference.sensitivity import LARGEST_TOLD
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetFit
     from regolithd.calibration.mismatch.fleet.choice.search import Place
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
     from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 

@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.regression.schur import (
     pseudo_inverse,
     schur_complement,
     schur_diagonal,
+    with_further_readings,
 )
 
 RNG = np.random.default_rng(0)
@@ -101,3 +102,25 @@ def test_rounding_below_zero_is_no_direction() -> None:
     inverse = pseudo_inverse(matrix, 1e-10)
     assert np.linalg.eigvalsh(inverse).min() > -1e-20
     assert along @ inverse @ along == pytest.approx(1e-8)
+
+
+def test_further_readings_of_some_columns_are_those_of_their_span() -> None:
+    """Least squares of the readings, and of three further copies of each column's part in the span of some."""
+    columns, some = np.column_stack((FITTED, NEW)), [4, 5]
+    span = np.linalg.qr(columns[:, some])[0]
+    within = span @ span.T
+    again = np.concatenate([columns, *[within @ columns] * 3])
+    read = np.concatenate([READING, *[within @ READING] * 3])
+    reductions = np.where(np.isin(np.arange(7), some), 4.0, 1.0)
+    gram, along = with_further_readings(columns.T @ columns, columns.T @ READING, reductions, 1e-12)
+    np.testing.assert_allclose(gram, again.T @ again)
+    np.testing.assert_allclose(along, again.T @ read)
+
+
+def test_where_no_column_knows_more_the_sums_stay() -> None:
+    """Also where one that would is 0 here."""
+    gram, of_new = OWN.copy(), moment()
+    gram[0], gram[:, 0] = 0.0, 0.0
+    found = with_further_readings(gram, of_new, np.array([9.0, 1.0, 1.0]), 1e-12)
+    assert found[0] is gram
+    assert found[1] is of_new

@@ -12,8 +12,9 @@ from synthetic_fleet import DRAG, WEAR, WHEELS, drive, equations_of, on_both, te
 from regolithd.calibration.mismatch.fleet.choice import chance
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import course_cost, further, may_share, penalty, places_of
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

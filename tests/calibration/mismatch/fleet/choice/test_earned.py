@@ -21,7 +21,8 @@ from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 
 CURVE = 4
 """The column over which recordings have a curve here."""

@@ -10,8 +10,9 @@ import pytest
 from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, Drive, Wave, drive, equations_of, least_squares, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import further, penalty, places_of
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -195,3 +196,25 @@ def test_where_noise_is_less_a_law_counts_more(drives: list[Drive]) -> None:
     assert again.delta_chi2 == pytest.approx(4 * fit.delta_chi2, rel=0.1)
     np.testing.assert_allclose(counted.squares(fit), plain.squares(fit), rtol=1e-9)
     np.testing.assert_allclose(counted.products(1, 0, [1, 3]), sums[1].gram[0][np.ix_([1, 3], [1, 3])], rtol=1e-9)
+
+
+def test_a_law_that_counts_more_takes_up_nothing_of_what_others_explain(drives: list[Drive]) -> None:
+    """Of readings that another law, or what a recording shows by itself, explains whole, it has nothing."""
+    exact = [Drive(each.columns.copy(), np.zeros_like(each.residual)) for each in drives]
+    for each in exact:
+        each.columns[3] += 0.3 * each.columns[1]
+        each.residual[:] = 0.5 * each.columns[1]
+    sums = [replace(each.sums(), reductions=np.array([1.0, 1.0, 30.0])) for each in exact]
+    of = fleet_equations(sums, ROVER, range(5), GROUPS, "rover")
+    drag, wave = (term(each, Course("always"), rovers=(0, 1)) for each in (DRAG, WAVE))
+    fit, alone = of.fit((drag, wave)), of.fit((drag,))
+    np.testing.assert_allclose(fit.coefficients[-3:], [0.5, 0.0, 0.0], atol=0.02)
+    assert fit.delta_chi2 == pytest.approx(alone.delta_chi2, rel=0.02)
+    of_wave = [gain for gain, each in further(of, alone, places_of(of)) if each.name == wave.name]
+    assert max(of_wave, default=0.0) < 0.01 * alone.delta_chi2
+    # What one recording shows by itself, and no other recording of its rover has.
+    sums[1], sums[3] = replace(sums[1], own=((1,),)), replace(sums[3], moment=np.zeros_like(sums[3].moment))
+    shown = fleet_equations(sums, ROVER, range(5), GROUPS, "rover")
+    without = shown.explained(shown.fit(()), [(1, 0)])
+    with_wave = shown.fit((term(WAVE, Course("always"), rovers=(1,)),))
+    assert shown.explained(with_wave, [(1, 0)]) == pytest.approx(without, rel=0.02)

@@ -9,7 +9,7 @@ import pytest
 from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import (
     course_cost,
     further,
@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.fleet.choice.search import (
     places_of,
     score,
 )
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 
 ROVER = (0, 1, 0, 1, 0, 1)
 CONCEALED = {**on_both(1, 0.1), (2, 1): 0.2, (3, 0): 0.15, (4, 1): -0.1}

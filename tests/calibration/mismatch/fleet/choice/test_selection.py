@@ -10,13 +10,16 @@ import pytest
 from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import further, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 from regolithd.calibration.mismatch.regression.residuals import active_rms
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from synthetic_fleet import Drive
 
 ROVER = (0, 1) * 5
 ENTRY = 8.0
@@ -92,11 +95,9 @@ def test_an_effect_of_some_rovers_is_on_those_alone() -> None:
     }
 
 
-def test_of_different_laws_on_two_rovers_none_is_on_both() -> None:
-    """A third law that is a little of both gains most over all of the fleet."""
-    drives = [drive(100 + n, on_both(2, 0.2 - 0.06 * (n % 2)) | on_both(3, 0.2 * (n % 2))) for n in range(10)]
+def three_drags(drives: Sequence[Drive]) -> FleetEquations:
+    """Return the equations of recordings in which a first law is nearly the sum of two others, which may act."""
     for each in drives:
-        each.columns[3] += 0.7 * each.columns[2]
         each.columns[1] = each.columns[2] + each.columns[3] + 0.3 * each.columns[1]
     names = ("steady-drag", "one-drag", "other-drag")
     candidates = [type("Named", (type(DRAG.candidate),), {"name": name})() for name in names]
@@ -104,8 +105,32 @@ def test_of_different_laws_on_two_rovers_none_is_on_both() -> None:
     sums = [replace(each.sums(), places=((1,), (2,), (3,))) for each in drives]
     of = fleet_equations(sums, ROVER, range(10), groups, "rover")
     assert further(of, of.fit(()), places_of(of))[0][1].name == "steady-drag"
-    found = chooser(of).chosen().terms
+    return of
+
+
+def test_of_different_laws_on_two_rovers_none_is_on_both() -> None:
+    """A third law that is a little of both gains most over all of the fleet."""
+    drives = [drive(100 + n, on_both(2, 0.2 - 0.06 * (n % 2)) | on_both(3, 0.2 * (n % 2))) for n in range(10)]
+    for each in drives:
+        each.columns[3] += 0.7 * each.columns[2]
+    found = chooser(three_drags(drives)).chosen().terms
     assert {(one.name, one.units.rovers) for one in found} == {("one-drag", (0,)), ("other-drag", (1,))}
+
+
+def test_of_two_laws_that_act_everywhere_none_is_the_third() -> None:
+    """A law that is a little of both gains most by itself, and leaves less than a law's share for either of them."""
+    drives = [drive(100 + n, on_both(2, 0.2) | on_both(3, 0.2)) for n in range(10)]
+    found = chooser(three_drags(drives)).chosen().terms
+    assert {(one.name, one.units.rovers) for one in found} == {("one-drag", (0, 1)), ("other-drag", (0, 1))}
+
+
+def test_a_law_with_which_a_search_begins_may_be_none() -> None:
+    """What gains too little beside the laws that were chosen after it is left out again."""
+    drives = [drive(100 + n, on_both(2, 0.2) | on_both(3, 0.2)) for n in range(10)]
+    of = three_drags(drives)
+    third, one, other = (term(group, Course("always"), rovers=(0, 1)) for group in of.groups)
+    left = chooser(of)._that_gain_enough(of.fit((third, one, other)))
+    assert {each.name for each in left.terms} == {"one-drag", "other-drag"}
 
 
 def test_an_effect_may_be_on_one_wheel_of_all_rovers() -> None:

@@ -9,7 +9,8 @@ import pytest
 from synthetic_fleet import DEVIATION, DRAG, GROUPS, WAVE, drive, equations_of, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of
 
 SIZES = (0.0, 0.0, 0.1, 0.2, 0.3)

@@ -18,9 +18,10 @@ from regolithd.calibration.mismatch.answer import Unexplained
 from regolithd.calibration.mismatch.candidates.stribeck_friction import StribeckFriction
 from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import penalty, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.inference.findings import Findings

@@ -19,7 +19,8 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Parameter
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 
 SIZE, POWER = 0.3, 0.86
 
