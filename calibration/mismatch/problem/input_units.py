@@ -91,21 +91,26 @@ def notes_on_units(
         except (RecordingError, SimulationError):
             return float("inf")
 
-    for name, stated in recorded if as_read > LEFT_AS_READ * variance else ():
+    def likely(name: str, stated: str) -> Iterator[tuple[float, str]]:
         for factor, offset, unit in CONVERSIONS[stated]:
             left = left_by(name, factor, offset)
-            if left >= LEFT_CONVERTED * as_read:
-                continue
-            if offset or factor > 1 or left < LEFT_SHRUNK * left_by(name, 0.0, 0.0):
-                told = (
-                    f"{name} is likely in {unit}: converted from that, the simulation leaves {left / as_read:.1g} of "
-                    f"the mean square that it leaves of {simulation.channel} now. Convert the column to {stated}, or "
-                    f"correct the simulation if it takes it so"
-                )
-                if as_read > variance:
-                    raise RecordingError(told)
-                yield f"{told}."
-                break
+            if left < LEFT_CONVERTED * as_read and (
+                offset or factor > 1 or left < LEFT_SHRUNK * left_by(name, 0.0, 0.0)
+            ):
+                yield left, unit
+
+    for name, stated in recorded if as_read > LEFT_AS_READ * variance else ():
+        left, unit = min(likely(name, stated), default=(0.0, ""))
+        if not unit:
+            continue
+        told = (
+            f"{name} is likely in {unit}: converted from that, the simulation leaves {left / as_read:.1g} of "
+            f"the mean square that it leaves of {simulation.channel} now. Convert the column to {stated}, or "
+            f"correct the simulation if it takes it so; another column with wrong values may look like that, too"
+        )
+        if as_read > variance:
+            raise RecordingError(told)
+        yield f"{told}."
 
 
 def _check_predicted(channel: str, measured: Array, predicted: Callable[[], Array]) -> None:

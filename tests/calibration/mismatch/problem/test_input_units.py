@@ -115,3 +115,30 @@ def test_a_predicted_column_in_another_unit_is_an_error(factor: float, unit: str
         return
     with pytest.raises(RecordingError, match=f"motor_A is likely in {unit}: .* Convert the column to A"):
         build_problem(from_columns(table), Climbing())
+
+
+class Turning(Climbing):
+    """A current that grows with the root of a speed."""
+
+    inputs = ("speed_rad_s",)
+    parameters: ClassVar = {"drag_A": Prior(0.9, 0.02, "A √(s/rad)")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the drag's part."""
+        return values["drag_A"] * np.sqrt(inputs["speed_rad_s"])
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed."""
+        return {"speed": inputs["speed_rad_s"]}
+
+
+def test_of_several_units_the_one_that_fits_best_is_told() -> None:
+    """Degrees per second leave a tenth of what the readings leave, revolutions per minute next to nothing."""
+    speed = 6 + 2 * np.sin(np.arange(ROWS) / 50)
+    table = {
+        "t_s": np.arange(ROWS) * 0.1,
+        "motor_A": 0.9 * np.sqrt(speed) + RNG.normal(0, 0.05, ROWS),
+        "speed_rad_s": speed * 30 / np.pi,
+    }
+    with pytest.raises(RecordingError, match="speed_rad_s is likely in rpm"):
+        build_problem(from_columns(table), Turning())
