@@ -28,30 +28,27 @@ def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
     group, acting = term.group, term.group.acting
     count = len(group.columns) if acting is None else np.sum(acting[:, list(term.wheels)].any(axis=1))
     total = thresholds.coefficient_penalty * float(count) + group.selection_penalty
+    return total + (_of_some_wheels(group, wheel_count, thresholds) if len(term.wheels) < wheel_count else 0.0)
+
+
+def _of_some_wheels(group: Group, wheel_count: int, thresholds: Thresholds) -> float:
+    """Return the penalty of the choice of wheels that are not all."""
+    # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
+    total = thresholds.single_wheel_penalty if "all" in group.sharing else 0.0
     # Where a corrected effect is on one wheel, that was known before: the wheel of its change was not chosen.
-    if len(term.wheels) < wheel_count and not (group.is_change and "all" not in group.sharing):
-        total += 2 * log(2 * wheel_count)
-        # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
-        total += thresholds.single_wheel_penalty if "all" in group.sharing else 0.0
-    return total
+    return total if group.is_change and "all" not in group.sharing else total + 2 * log(2 * wheel_count)
 
 
 def penalties(
     groups: Sequence[Group], sets: Sequence[tuple[int, ...]], wheel_count: int, thresholds: Thresholds
 ) -> Array:
-    """Return the penalties of groups on sets of wheels, shape (set, group).
-
-    Most groups act alike on all wheels and show in no other channel: their penalty is one of two, on all wheels and on
-    some.
-    """
-    found = np.zeros((len(sets), len(groups)))
+    """Return the penalties of groups on sets of wheels, shape (set, group)."""
     all_wheels = tuple(range(wheel_count))
-    of_some = np.array([len(wheels) < wheel_count for wheels in sets])
+    of_all = np.array([penalty(Term(group, all_wheels), wheel_count, thresholds) for group in groups])
+    of_choice = np.array([_of_some_wheels(group, wheel_count, thresholds) for group in groups])
+    found = of_all + np.array([len(wheels) < wheel_count for wheels in sets])[:, None] * of_choice
     for place, group in enumerate(groups):
-        if group.acting is None and group.own_channel is None:
-            on_some = penalty(Term(group, ()), wheel_count, thresholds)
-            found[:, place] = np.where(of_some, on_some, penalty(Term(group, all_wheels), wheel_count, thresholds))
-        else:
+        if group.acting is not None or group.own_channel is not None:  # which wheels they are matters, not how many
             found[:, place] = [penalty(Term(group, wheels), wheel_count, thresholds) for wheels in sets]
     return found
 
