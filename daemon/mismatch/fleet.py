@@ -83,15 +83,32 @@ def files_of_rovers(paths: Sequence[Path], rover_from: RoverFrom | None) -> list
     Raises
     ------
     RecordingError
-        When a recording does not say whose it is, and was to.
+        When a recording does not say whose it is, and was to; or when one is given twice, or is a copy of another.
     """
-    places = [path.resolve() for path in paths]
-    if twice := [path for k, path in enumerate(paths) if places[k] in places[:k]]:
-        raise RecordingError(f"{twice[0]} is given twice: the same readings would count as two recordings")
+    _check_that_each_is_another(paths)
     found = [each for path in paths for each in _rovers_of(path, rover_from)]
     if rover_from and (silent := [str(each.path) for each in found if not each.rover and not each.damaged]):
         raise RecordingError(f"{silent[0]} does not say whose it is: it has no {rover_from} that names a rover")
     return found
+
+
+def _check_that_each_is_another(paths: Sequence[Path]) -> None:
+    """Raise an error where two paths lead to the same readings, which would count as two recordings."""
+    places = [path.resolve() for path in paths]
+    if twice := [path for k, path in enumerate(paths) if places[k] in places[:k]]:
+        raise RecordingError(f"{twice[0]} is given twice: the same readings would count as two recordings")
+    of_size: dict[int, list[Path]] = {}
+    for path in paths:
+        if path.is_file() and path.stat().st_size:
+            of_size.setdefault(path.stat().st_size, []).append(path)
+    for alike in of_size.values():
+        known: dict[str, Path] = {}
+        for path in alike if len(alike) > 1 else ():  # only what is as long may be a copy, and has to be read for it
+            first = known.setdefault(digest_of(path), path)
+            if first is not path:
+                raise RecordingError(
+                    f"{path} is a copy of {first}: the same readings would count as two recordings. Leave one out"
+                )
 
 
 def _rovers_of(path: Path, rover_from: RoverFrom | None) -> list[RoverFile]:

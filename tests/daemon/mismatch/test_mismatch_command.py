@@ -168,6 +168,16 @@ def test_a_file_that_is_given_twice_is_an_error(start: Path, tmp_path: Path) -> 
     assert (done.exit_code, done.stderr.splitlines()[-1].count("is given twice")) == (65, 1)
 
 
+def test_a_copy_of_a_file_is_an_error(start: Path, tmp_path: Path) -> None:
+    """Under another name, or another date, its readings would count as two recordings as well."""
+    recording, copy = joint(tmp_path / "2026-05-01.csv", 1), tmp_path / "2026-05-02.csv"
+    other = joint(tmp_path / "2026-05-03.csv", 2)
+    copy.write_bytes(recording.read_bytes())
+    done = call(recording, other, copy, "--simulation", start / "SIM.toml")
+    message = f"regolithd mismatch: {copy} is a copy of {recording}: the same readings would count as two recordings."
+    assert (done.exit_code, done.stderr.splitlines()[-1]) == (65, f"{message} Leave one out")
+
+
 def test_an_answer_that_a_corrected_file_cannot_hold_is_printed_all_the_same(start: Path, tmp_path: Path) -> None:
     """What is unexplained over time has no curve for another recording; answer and report are there nevertheless."""
     path = joint(tmp_path / "joint.csv", 1, friction_Nm=0.0)
