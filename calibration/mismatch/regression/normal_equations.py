@@ -268,7 +268,8 @@ class NormalEquations:
         if key not in self._latest_asked:
             if len(self._latest_asked) == MOST_ASKED:
                 self._latest_asked.clear()
-            self._latest_asked[key] = Asked.of(self, groups)  # which keeps the groups, and so their identities
+            # It keeps the groups, and so their identities.
+            self._latest_asked[key] = Asked.of(self.design, self.weights, self.folds, self.wheel_sets, groups)
         return self._latest_asked[key]
 
     @cached_property
