@@ -80,6 +80,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "_Spectra",
         "_Fitted",
         "Addition",
+        "Asked",
         "Bands",
         "TimedSpells",
         "Beside",
