@@ -248,7 +248,7 @@ class NormalEquations:
         """Return the same of these groups as a table."""
         asked, fitted = self._asked(tuple(groups)), self.fit(given)
         at, on = asked.at, np.array([[float(wheel in wheels) for wheel in self.all_wheels] for wheels in asked.sets])
-        cross = np.tensordot(on, self._crosses_of(fitted.columns, asked), axes=1)
+        cross = np.tensordot(on, self._crosses(fitted.columns, asked), axes=1)
         moment = on @ self.moment[:, at] - fitted.coefficients @ cross
         left = Left(on, moment, cross, fitted.covariance @ cross, on @ self.energies(at))
         gains = np.zeros(asked.may_share.shape)
@@ -278,15 +278,14 @@ class NormalEquations:
 
     def cross(self, fitted: Columns, at: Index, wheels: tuple[int, ...]) -> Array:
         """Return sums of products of fitted columns and others that act on `wheels`, shape (fitted, other)."""
-        return np.asarray(self._crosses(fitted, at)[list(wheels)].sum(axis=0))
+        on = membership(fitted, len(self.weights)).T[:, :, None]
+        return np.asarray((on * self.products([column for column, _ in fitted], at))[list(wheels)].sum(axis=0))
 
-    def _crosses(self, fitted: Columns, at: Index) -> Array:
-        """Return sums of products of fitted columns, where they act, and others, shape (wheel, fitted, other)."""
-        on = membership(fitted, len(self.weights)).T
-        return on[:, :, None] * self.products([column for column, _ in fitted], at)
+    def _crosses(self, fitted: Columns, asked: Asked) -> Array:
+        """Return sums of products of fitted columns, where they act, and what is asked, shape (wheel, fitted, other).
 
-    def _crosses_of(self, fitted: Columns, asked: Asked) -> Array:
-        """Return the same of what is asked; most columns of a fit were in the one before."""
+        Most columns of a fit were in the one before.
+        """
         fresh = list(dict.fromkeys(column for column, _ in fitted if column not in asked.crosses))
         if fresh:
             asked.crosses.update(zip(fresh, np.swapaxes(self.products(fresh, asked.at), 0, 1), strict=True))
