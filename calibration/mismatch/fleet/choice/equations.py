@@ -135,9 +135,9 @@ class FleetEquations:
         solved = inverse @ moment
         gained = float(moment @ solved)
         if (rest := self._counting_alike(at, by)).sum() < len(at):
-            gained -= _explained(matrix[np.ix_(rest, rest)], moment[rest])
-            matrix, moment = self._with_priors(at[rest], by[rest], used)
-            gained += _explained(matrix, moment)
+            alone = self._with_priors(at[rest], by[rest], used)
+            gained -= _beyond(matrix, moment, rest, alone)
+            matrix, moment = alone
         if base:
             gained -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
         return FleetFit(terms, at, by, solved, inverse, gained, tuple(spans))
@@ -225,8 +225,7 @@ class FleetEquations:
         total = _explained(matrix, moment)
         if not rest.all():
             kept = np.append(rest, np.ones(len(moment) - len(rest), np.bool_))
-            total -= _explained(matrix[np.ix_(kept, kept)], moment[kept])
-            total += _explained(*self._with_own(fit.columns[rest], fit.factors[rest], terms))
+            total -= _beyond(matrix, moment, kept, self._with_own(fit.columns[rest], fit.factors[rest], terms))
         return total
 
     def _with_own(self, at: NDArray[np.int64], by: Array, terms: Iterable[tuple[int, int]]) -> tuple[Array, Array]:
@@ -304,6 +303,17 @@ class FleetEquations:
 def _explained(matrix: Array, moment: Array) -> float:
     """Return by how much the coefficients of normal equations lower χ²."""
     return float(moment @ pseudo_inverse(matrix, SINGULAR) @ moment)
+
+
+def _beyond(matrix: Array, moment: Array, kept: NDArray[np.bool_], alone: tuple[Array, Array]) -> float:
+    """Return by how much more these coefficients lower χ² among others' further readings than by themselves, `alone`.
+
+    Parameters
+    ----------
+    matrix, moment: of all coefficients; `kept` are those that know no more than the long-run variance says
+    alone: matrix and moment of these without the others
+    """
+    return _explained(matrix[np.ix_(kept, kept)], moment[kept]) - _explained(*alone)
 
 
 def _columns_by_recording(sums: Sequence[Sums], terms: Iterable[tuple[int, int]]) -> dict[int, list[int]]:
