@@ -17,12 +17,14 @@ from regolithd.calibration.mismatch.fleet.choice.held_out import held_out_square
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.choice.search import penalty
-from regolithd.calibration.mismatch.fleet.choice.selection import without
+from regolithd.calibration.mismatch.fleet.choice.selection import told_by_others, without
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
+
+    from numpy.typing import NDArray
 
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
@@ -120,13 +122,15 @@ class _Names:
         """Return whether a name lowers the error of recordings that did not fit it, where there are such."""
         chooser, beside = self._beside
         factors = chooser.equations.factors(beside.terms[index])
-        if factors.any(axis=2).sum(axis=1).max() < FEWEST_HELD_OUT:
+        told = told_by_others(chooser.equations, without(beside, index))
+        where = factors.any(axis=0) & told[:, None]
+        if factors.any(axis=2).sum(axis=1).max() < FEWEST_HELD_OUT or not where.any():
             return True
-        return _gain(self.chooser.equations, self.fit, index) > 0 and _gain(chooser.equations, beside, index) > 0
+        both = ((self.chooser.equations, self.fit), (chooser.equations, beside))
+        return all(_gain(*each, index, where) > 0 for each in both)
 
 
-def _gain(equations: FleetEquations, fit: FleetFit, index: int) -> float:
-    """Return by how much an effect lowers the sum of squares, where it acts, of recordings that did not fit it."""
+def _gain(equations: FleetEquations, fit: FleetFit, index: int, where: NDArray[np.bool_]) -> float:
+    """Return by how much an effect lowers the sum of squares where it is asked, of recordings that did not fit it."""
     squares = held_out_squares(equations, fit)
-    where = equations.factors(fit.terms[index]).any(axis=0)
     return float((squares.without[index] - squares.after)[where].sum())

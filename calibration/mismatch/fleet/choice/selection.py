@@ -153,12 +153,16 @@ class Chooser:
         return tuple(rover for rover, shows in zip(term.units.rovers, certain.tolist(), strict=True) if shows)
 
     def _certain(self, fit: FleetFit, index: int) -> NDArray[np.bool_]:
-        """Return which sizes of a term have their signs, and are further from 0 than the entry asks for."""
+        """Return which sizes of a term have their signs, and are further from 0 than the entry asks for.
+
+        Of a size that is a rover's own that is asked for each of the rovers, as for having been chosen among them.
+        """
         term, span = fit.terms[index], fit.spans[index]
         sizes = fit.coefficients[span].reshape(-1, len(term.group.columns))
         variances = np.diag(fit.covariance)[span].reshape(sizes.shape)
         signed = np.all(np.array(term.group.signs) * sizes >= 0, axis=1)
-        return np.asarray(signed & (np.max(sizes**2 / variances, axis=1) >= self.entry_threshold))
+        needed = self.entry_threshold + 2 * np.log(len(self.equations.recordings_of))
+        return np.asarray(signed & (np.max(sizes**2 / variances, axis=1) >= needed))
 
     def acceptable(self, fit: FleetFit) -> bool:
         """Return whether every coefficient has its sign, every effect is large enough, and each law has one shape."""
@@ -189,12 +193,14 @@ class Chooser:
         """Return by how much a term's Δχ² on recordings that did not fit it passes the share that is asked for.
 
         Of a gain that the priors alone pay (a parameter need not stray) no recording can give anything back: only what
-        the readings gained is asked for.
+        the readings gained is asked for. A recording in which another effect has a size that only it tells is not
+        asked: without that size, what is left there is that effect.
         """
         equations, rest, term = self.equations, without(fit, index), fit.terms[index]
         if max(len(equations.of_rovers(rovers)) for rovers, _ in term.parts) < FEWEST_TO_CONFIRM:
             return 0.0
-        weights = equations.weights * equations.reductions[:, term.group.columns[0], None]
+        asked = told_by_others(equations, rest)[:, None]
+        weights = asked * equations.weights * equations.reductions[:, term.group.columns[0], None]
 
         def saved(used: Array | None = None) -> Array:
             with_it, less = (equations.fit(terms, used) for terms in (fit.terms, rest))
@@ -232,6 +238,18 @@ def folds_of(equations: FleetEquations) -> list[Array]:
     for rover, recordings in enumerate(equations.recordings_of):
         fold[list(recordings)] = (rover + np.arange(len(recordings))) % THRESHOLDS.folds
     return [(fold == number).astype(np.float64) for number in np.unique(fold)]
+
+
+def told_by_others(equations: FleetEquations, terms: Sequence[FleetTerm]) -> NDArray[np.bool_]:
+    """Return in which recordings each size of these terms acts in a recording of another fold too, (recording,)."""
+    found = np.ones(equations.count, np.bool_)
+    sizes = [equations.factors(term).any(axis=2) for term in terms]
+    acts = np.concatenate(sizes) if sizes else np.zeros((0, equations.count), np.bool_)
+    for fold in folds_of(equations):
+        out = fold > 0
+        alone = ~acts[:, ~out].any(axis=1)
+        found[out] = ~acts[alone][:, out].any(axis=0)
+    return found
 
 
 def without(fit: FleetFit, index: int) -> tuple[FleetTerm, ...]:

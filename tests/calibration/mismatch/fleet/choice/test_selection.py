@@ -12,7 +12,13 @@ from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_bo
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import further, places_of
-from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
+from regolithd.calibration.mismatch.fleet.choice.selection import (
+    Chooser,
+    folds_of,
+    relative_size,
+    told_by_others,
+    without,
+)
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
 from regolithd.calibration.mismatch.regression.residuals import active_rms
 
@@ -202,6 +208,30 @@ def test_an_effect_of_one_recording_is_not_confirmed_by_the_others() -> None:
     found = chooser(of)._confirmed(of.fit((of_one, of_all)))
     assert found.terms == (of_all,)
     assert found.delta_chi2 == pytest.approx(of.fit((of_all,)).delta_chi2)
+
+
+def test_a_recording_that_alone_tells_another_effect_s_size_is_not_asked() -> None:
+    """Without that size, what is left there is that effect, and not what the recordings before predict."""
+    drives = [drive(100 + n, on_both(4, 0.15) | on_both(1, 2.0 if n == 3 else 0.0)) for n in range(4)]
+    drives[3].columns[4] -= 0.7 * drives[3].columns[1]
+    of = equations_of(drives, (0,) * 4)
+    terms = (term(DRAG, Course("since", 3)), term(WAVE, Course("always")))
+    assert told_by_others(of, terms).tolist() == [True, True, True, False]
+    assert told_by_others(of, terms[1:]).all()
+    assert told_by_others(of, ()).all()
+    assert chooser(of)._transfer_margin(of.fit(terms), 1) > 0
+
+
+def test_a_size_of_a_rover_s_own_pays_for_the_choice_among_rovers() -> None:
+    """What passes on the only rover is no certain size on one of four."""
+    each = FleetTerm(DRAG, Units((0,), (0, 1), each=True), Course("always"))
+    for count in (1, 4):
+        of = equations_of([drive(100 + n, on_both(1, 0.2 * (n == 0))) for n in range(4)], [n % count for n in range(4)])
+        fit = of.fit((each,))
+        gained = float(fit.coefficients[fit.spans[0]][0] ** 2 / np.diag(fit.covariance)[fit.spans[0]][0])
+        needed = gained - 2 * np.log(count)
+        for entry, certain in ((needed - 0.1, True), (needed + 0.1, False)):
+            assert replace(chooser(of), entry_threshold=entry)._certain(fit, 0).all() == certain
 
 
 def test_two_recordings_cannot_confirm_an_effect_and_three_can() -> None:
