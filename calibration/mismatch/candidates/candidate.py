@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.fitted_variant import at_fitted_value, over_fitted_value
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -325,12 +327,16 @@ class Candidate:
         """
         return None
 
-    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the shape that agrees with its fitted coefficients `values`, where the law is not linear in them.
 
-        The engine alternates this with the fit until the shape stays the same.
+        The engine alternates this with the fit until the shape stays the same. By default the change by a variant of
+        the simulation, where the column is that, is taken over the fitted value.
         """
-        return shape
+        if not problem.simulation.variants():
+            return shape
+        columns = self.columns(over_fitted_value(problem, shape), shape)
+        return at_fitted_value(problem, shape, values, columns, SHAPE_TOLERANCE)
 
     def resolution(self, problem: Problem) -> float:  # noqa: ARG002
         """Return within how much of a shape parameter the columns' slope with it may jump: one is taken across it."""

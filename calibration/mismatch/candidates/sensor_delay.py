@@ -8,7 +8,8 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.lag_scan import best_lag
-from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
+from regolithd.calibration.mismatch.problem.delayed import filtered, shifted, smoothed
+from regolithd.calibration.mismatch.problem.fitted_variant import over_fitted_value
 from regolithd.calibration.mismatch.problem.limits import at_limit
 from regolithd.calibration.mismatch.signal.stretches import stretches
 
@@ -47,12 +48,12 @@ class SensorDelay(Candidate):
     """The predicted channel, or one of the simulation's inputs, is late by a constant time.
 
     The predicted channel is late by a dead time (a bus, polling), or by the time constant of a first-order filter,
-    which is how late it is on a ramp. The change of the prediction is exact for the shape's own delay (no Taylor
-    series); per second of delay, so that the coefficient is the delay. Both are optimised together, since a delay shows
-    in when the column steps. How far it steps is predicted from inputs with errors: `passed` is the share of the
-    predicted change that was recorded, 1 ± 0.2 before the recording (1 ± 0.025 of an input, which is smoothed by its
-    stated error first) and from a half to two after it. The delay of an input costs a run of the simulation for each
-    whole reading; between them the change is interpolated.
+    which is how late it is on a ramp: one before it is read, or an exponential smoothing of the readings. The change of
+    the prediction is exact for the shape's own delay (no Taylor series); per second of delay, so that the coefficient
+    is the delay. Both are optimised together, since a delay shows in when the column steps. How far it steps is
+    predicted from inputs with errors: `passed` is the share of the predicted change that was recorded, 1 ± 0.2 before
+    the recording (1 ± 0.025 of an input, which is smoothed by its stated error first) and from a half to two after it.
+    The delay of an input costs a run of the simulation for each whole reading; between them the change is interpolated.
 
     What acts on the machine shows as late as the predicted channel is: once that is named, all else is searched for
     again, late by as much. Once an input's delay is named, all else is searched for with that input on time.
@@ -72,16 +73,17 @@ class SensorDelay(Candidate):
     along_motion = False
     imitated_over = "none"
     late_with_channel = False
-    forms = ("dead time", "first-order filter")
+    forms = ("dead time", "first-order filter", "exponential smoothing")
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
     shape_keys: ClassVar = {
         "late": "the column that is late",
         "secant_s": "dead time of the predicted channel",
         "filter_s": "time constant of its first-order filter",
+        "smoothing_s": "time constant of an exponential smoothing of its readings",
         OF_INPUT: "dead time of an input",
         PASSED: "share of the predicted change that was recorded (without the key: 1)",
     }
-    free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf")), OF_INPUT: (0.0, float("inf"))}
+    free: ClassVar = dict.fromkeys(("secant_s", "filter_s", "smoothing_s", OF_INPUT), (0.0, float("inf")))
 
     scaled_by = PASSED
 
@@ -103,8 +105,8 @@ class SensorDelay(Candidate):
 
     def form_of(self, shape: Shape) -> str:
         """Return what delays the column; an input is tried as late by a dead time."""
-        dead_time, of_first_order = self.forms
-        return of_first_order if "filter_s" in shape else dead_time
+        of_channel = dict(zip(OF_CHANNEL, self.forms, strict=True))
+        return next((form for kind, form in of_channel.items() if kind in shape), self.forms[0])
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the predicted channel and each input, late by two readings up to a tenth of the recording.
@@ -300,6 +302,7 @@ def _standing(direction: Array, first: int, end: int) -> slice:
 OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
     "secant_s": lambda recording, values, delay: shifted(recording, values, -delay),
     "filter_s": filtered,
+    "smoothing_s": smoothed,
 }
 """What delays the predicted channel, by the shape parameter that holds the delay: dead time, or a filter."""
 
@@ -310,7 +313,7 @@ KINDS = (*OF_CHANNEL, OF_INPUT)
 
 def columns_of(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
     """Return a candidate's columns as the predicted channel shows them: not at a limit, and late where it is late."""
-    columns = np.asarray(candidate.columns(problem, shape), np.float64)
+    columns = np.asarray(candidate.columns(over_fitted_value(problem, shape), shape), np.float64)
     if candidate.loads and (limited := at_limit(problem)).any():
         columns = np.where(limited, 0.0, columns)
     return late_with(problem, candidate, columns)

@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.problem.problem import Problem
+
+
+LEAST_STRENGTH, LARGEST_STRENGTH = 0.05, 3.0
+"""Strengths for which the soil model is run (a choice: Lyasko's is 1; below a twentieth it acts in proportion)."""
 
 
 class SlipSinkage(Candidate):
@@ -44,6 +48,13 @@ class SlipSinkage(Candidate):
         has_soil = "slip_sinkage" in problem.simulation.variants()
         through: list[Shape] = [{"step": 0.3}, {"step": 1.0}] if has_soil else []
         return [*through, {"power": 1.0}]
+
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+        """Return the shape with the soil model at the fitted strength."""
+        if "step" not in shape:
+            return shape
+        before, strength = float(shape["step"]), float(np.clip(values[0], LEAST_STRENGTH, LARGEST_STRENGTH))
+        return shape if abs(strength - before) < SHAPE_TOLERANCE * before else {**shape, "step": strength}
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the change of the prediction for more sinkage per unit of strength, or prediction × slip."""

@@ -42,6 +42,9 @@ Array = NDArray[np.float64]
 TOLD_SHARE = 0.5
 """Share of the furthest move, in standard deviations of what was known, beyond which another is told too (a choice)."""
 
+CERTAIN_LEAD = 9.2
+"""Lead in Δχ² from which on the readings tell an effect's change from a parameter's: 2 ln 99, odds of 99 to 1."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Weighed:
@@ -77,8 +80,14 @@ def with_changes_beside_same_parameters(decision: Decision) -> Decision:
     """Return the decision with changes of corrected effects for which the parameters were told to move.
 
     The one for which most speaks comes first. Beside something unexplained parameters imitate a part of that, so that
-    nothing is weighed.
+    nothing is weighed. A change that was told already, beside parameters anywhere within their priors, is weighed again
+    where these might have moved instead: its size is better known beside parameters as they were.
     """
+    for term in () if decision.unnamed else decision.whole.terms:
+        rest = _without(decision, term)
+        told = [each for each in _weighed(rest) if each.change[0].subject == term.group.subject]
+        if told and _is_refuted(rest, told[0]) and told[0].says_changed and told[0].lead < CERTAIN_LEAD:
+            decision = _with_change(rest, told[0])
     for _ in decision.equations.problem.stated:
         found = [] if decision.unnamed else list(_weighed(decision))
         told = [each for each in found if _is_refuted(decision, each) and each.says_changed]
@@ -99,6 +108,13 @@ def with_changed_or_moved(decision: Decision, others: tuple[Alternative, ...]) -
     other = Alternative(tuple(sorted(names)), max(lead if told else -lead, 0.0), tuple(kept))
     rest = [each for each in others if each.effects != other.effects]
     return tuple(sorted((other, *rest), key=lambda each: each.margin))
+
+
+def _without(decision: Decision, term: Term) -> Decision:
+    """Return the decision without one of its terms."""
+    fits = (decision.named, decision.whole)
+    named, whole = (decision.equations.fit([each for each in fit.terms if each is not term]) for fit in fits)
+    return replace(decision, named=named, whole=whole)
 
 
 def _weighed(decision: Decision) -> Iterator[_Weighed]:

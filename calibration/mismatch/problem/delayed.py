@@ -1,4 +1,4 @@
-"""Columns behind a dead time or a first-order filter, in each run by itself."""
+"""Columns behind a dead time or a filter of first order, in each run by itself."""
 
 from __future__ import annotations
 
@@ -24,9 +24,23 @@ def filtered(recording: Recording, values: Array, time_constant_s: float) -> Arr
     """
     decay = float(np.exp(-recording.step_s / time_constant_s))
     slope = (1 - decay) * time_constant_s / recording.step_s
-    begins = np.concatenate(([True], ~recording.without_gap))
     added = (1 - slope) * values
     added[1:] += (slope - decay) * values[:-1]
+    return _of_first_order(recording, values, decay, added)
+
+
+def smoothed(recording: Recording, values: Array, time_constant_s: float) -> Array:
+    """Return values (time, wheel) as an exponential smoothing of their readings: y_k = a y_(k−1) + (1 − a) x_k.
+
+    A digital filter is that, with a = exp(−step / time constant). Each run begins at its first value, as above.
+    """
+    decay = float(np.exp(-recording.step_s / time_constant_s))
+    return _of_first_order(recording, values, decay, (1 - decay) * values)
+
+
+def _of_first_order(recording: Recording, values: Array, decay: float, added: Array) -> Array:
+    """Return what decays from one reading to the next and is added to, from the first value of each run on."""
+    begins = np.concatenate(([True], ~recording.without_gap))
     added[begins] = values[begins]
     return recursion(np.where(begins, 0.0, decay)[:, None], added)
 

@@ -106,6 +106,7 @@ class Problem:
     smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where any was bridged as well
     at_once: whether friction is taken to reverse at once, however the recording shows it to
     unknown: initial states of runs, by their names, that are known no better than anything may be
+    variant_value: the step of `secant` for variants of the simulation; None: the one that is asked for
     """
 
     recording: Recording
@@ -135,6 +136,7 @@ class Problem:
     smoothed: Mapping[str, Array] = field(default_factory=dict, repr=False)
     at_once: bool = False
     unknown: frozenset[str] = frozenset()
+    variant_value: float | None = None
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
     _lately: RecentArrays = field(default_factory=RecentArrays, init=False, repr=False, compare=False)
@@ -283,8 +285,10 @@ class Problem:
         return self._where_predicted(predicted)
 
     def secant(self, name: str, step: float) -> Array:
-        """Return the prediction's change per unit of a parameter, over a step from its value."""
+        """Return the prediction's change per unit of a parameter or a variant, over a step from its value."""
         value = self._all_values[name]
+        if self.variant_value is not None and name in self.simulation.variants():
+            step = self.variant_value
         return self.run_once(name, step, lambda: (self.changed(**{name: value + step}) - self.filled) / step)
 
     def tangent_step(self, name: str) -> float:

@@ -40,6 +40,8 @@ MOST_STEPS = 30
 """Steps of that, at most; most take five."""
 MOST_EVALUATIONS = 150
 """Of the search for several numbers together (a choice: two take 40 to 60)."""
+FURTHEST = 4.0
+"""Factor by which a number of a shape may be extrapolated (a choice)."""
 NEAR = 3
 """Readings about an onset at which another development is tried too (a choice)."""
 MISFORESEEN = 0.5
@@ -294,6 +296,7 @@ def _at_its_coefficient(
 
 def _self_consistent(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:
     """Return the term with a shape that agrees with its coefficients, as far as a few steps lead there."""
+    tried: list[tuple[float, float]] = []
     for _ in range(equations.thresholds.self_consistency_steps):
         if (candidate := term.group.candidate) is None:
             break
@@ -303,8 +306,30 @@ def _self_consistent(equations: NormalEquations, others: Sequence[Term], term: T
         shape = candidate.self_consistent_shape(equations.problem, term.group.shape, values.tolist())
         if shape == term.group.shape:
             break
-        equations, term = _reshaped(equations, term, shape)
+        equations, term = _reshaped(equations, term, _extrapolated(term.group.shape, shape, tried))
     return equations, term
+
+
+def _extrapolated(before: Shape, asked: Shape, tried: list[tuple[float, float]]) -> Shape:
+    """Return the shape at which the one number that was asked for would be the number asked for (secant method).
+
+    Parameters
+    ----------
+    before, asked: the shape that was fitted, and the shape that its coefficients ask for
+    tried: that number before and as asked for, of each step; this one is appended
+    """
+    changed = [name for name, value in asked.items() if before.get(name) != value]
+    if len(changed) != 1 or changed[0] not in before:
+        return asked
+    name = changed[0]
+    tried.append((float(before[name]), float(asked[name])))
+    if len(tried) == 1:
+        return asked
+    (first, of_first), (last, of_last) = tried[-2:]
+    lead, towards = of_last - last, (of_first - first) - (of_last - last)
+    steps = (last - first) / towards if towards else 0.0
+    low, high = sorted((last / FURTHEST, last * FURTHEST))
+    return {**asked, name: min(max(last + steps * lead, low), high)} if steps > 0 else asked
 
 
 def _reshaped(equations: NormalEquations, term: Term, shape: Shape) -> tuple[NormalEquations, Term]:

@@ -66,9 +66,9 @@ class SelectionThresholds:
     )
     # Regression
     least_tolerance: float = threshold(
-        1e-3,
+        1e-4,
         "Tolerance (1 / variance inflation factor) below which a column counts as a combination of the others.",
-        "standard: the usual limit of stepwise regression (SPSS, SAS) is 1e-3 to 1e-4; sums are in single precision",
+        "standard: 1e-4 is the usual limit of stepwise regression (SPSS); sums are in single precision",
     )
     active_share: float = threshold(
         0.4,

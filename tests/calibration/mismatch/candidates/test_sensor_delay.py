@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import accumulate
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
+from regolithd.calibration.mismatch.problem.delayed import filtered, shifted, smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 COUNT, STEP_S = 4000, 0.1
 TIME_S = STEP_S * np.arange(COUNT)
 DELAY = SensorDelay()
+KINDS = ("secant_s", "filter_s", "smoothing_s")
 
 
 class Lift(Simulation):
@@ -53,9 +55,12 @@ def problem_of(recorded: Array, load: Array, moving: Array) -> Problem:
 
 
 def late(values: Array, kind: str, delay: float) -> Array:
-    """Return values (time,) late by a dead time, or behind a first-order filter, by their definitions."""
+    """Return values (time,) late by a dead time, or behind a filter of their course or readings, by definition."""
     if kind == "secant_s":
         return np.interp(TIME_S - delay, TIME_S, values)
+    if kind == "smoothing_s":
+        kept = np.exp(-STEP_S / delay)
+        return np.array(list(accumulate(values, lambda before, now: kept * before + (1 - kept) * now)))
     found, fine = values[0], 200
     course = []
     for before, now in zip(np.append(values[0], values[:-1]), values, strict=True):
@@ -75,6 +80,16 @@ def test_a_filter_is_that_of_its_differential_equation(delay: float) -> None:
     )
 
 
+def test_a_smoothing_is_that_of_its_recursion() -> None:
+    """A digital filter takes a share of each reading; with many in its time constant it is the filter."""
+    load, moving = loads()
+    recording = problem_of(load, load, moving).recording
+    for delay in (0.15, 4.0):
+        found = smoothed(recording, load[:, None], delay)
+        np.testing.assert_allclose(found[:, 0], late(load, "smoothing_s", delay))
+    np.testing.assert_allclose(found, filtered(recording, load[:, None], 4.0), atol=0.1)
+
+
 def test_a_filter_begins_anew_after_a_gap_and_in_each_run() -> None:
     """Nothing is known of what it held meanwhile."""
     load, moving = loads()
@@ -85,7 +100,7 @@ def test_a_filter_begins_anew_after_a_gap_and_in_each_run() -> None:
     assert found[[0, 1000, 2500]] == pytest.approx(load[[0, 1000, 2500]])
 
 
-@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_late_channel_reports_at_a_start_what_it_was_at_standstill(kind: str) -> None:
     """Where the simulation says nothing, what was recorded there stands for it."""
     load, moving = loads()
@@ -103,18 +118,20 @@ def test_without_a_reading_a_straight_line_bridges_the_gap() -> None:
     load, moving = loads()
     recorded = np.where(moving > 0.5, load, np.nan)
     problem = problem_of(recorded, load, moving)
-    for kind in ("secant_s", "filter_s"):
+    for kind in KINDS:
         (column,) = DELAY.columns(problem, {"late": "current_A", kind: 0.5})
         assert np.isfinite(column[problem.mask]).all()
 
 
-@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
-@pytest.mark.parametrize("delay", [0.25, 0.9])
-def test_either_kind_is_found_with_its_delay(kind: str, delay: float) -> None:
-    """From two and a half readings on; the other kind is not taken for it."""
-    load, _ = loads()
+@pytest.mark.parametrize(
+    ("kind", "delay"),
+    [("secant_s", 0.25), ("secant_s", 0.9), ("filter_s", 0.25), ("filter_s", 0.9), ("smoothing_s", 0.25)],
+)
+def test_each_kind_is_found_with_its_delay(kind: str, delay: float) -> None:
+    """From two and a half readings on; a smoothing over many readings is a filter."""
+    load = loads()[0] + 4 * np.abs(TIME_S % 3 - 1.5)
     random = np.random.default_rng(3)
-    recorded = late(load, kind, delay) + 0.5 * random.normal(size=COUNT)
+    recorded = late(load, kind, delay) + 0.2 * random.normal(size=COUNT)
     columns = {"t_s": TIME_S, "load_A": load, "moving": np.ones(COUNT), "current_A": recorded}
     found = compare(columns, Lift())
     (effect,) = found.answer.effects
@@ -186,7 +203,7 @@ class Winch(Cart):
         return np.where(inputs["speed_rad_s"] == 0, 0.0, super().predict(inputs, values))
 
 
-@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_between_rest_and_motion_the_axis_moves(kind: str) -> None:
     """Readings after 0 that are too slow for a direction are of the motion: late friction is a step, and no ramp."""
     speed = np.where(np.arange(COUNT) // 100 % 2, np.clip(np.arange(COUNT) % 100 / 15, 0.1, 1.0), 0.0)
@@ -211,7 +228,7 @@ def test_a_blank_without_a_change_of_direction_is_no_standstill() -> None:
     np.testing.assert_allclose(behind[5:], problem.measured[5:], atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("every", [10, None])
 def test_what_a_late_channel_shows_does_not_depend_on_which_of_its_readings_are_blank(
     kind: str, every: int | None

@@ -65,7 +65,8 @@ def test_without_the_posterior_the_parameter_takes_it_up(corrected: Path, tmp_pa
     """What each is known by alone allows the one to stand for the other."""
     text = re.sub(r"posterior = .*\n", "", corrected.read_text(encoding="utf-8"))
     (tmp_path / "NEW.toml").write_text(text, encoding="utf-8")
-    assert _answer(stirred(4, 1.8 * DRAG), tmp_path / "NEW.toml").verdict == "consistent"
+    assert _answer(stirred(4, 1.4 * DRAG), corrected).verdict == "missing-physics"
+    assert _answer(stirred(4, 1.4 * DRAG), tmp_path / "NEW.toml").verdict == "consistent"
 
 
 def test_a_parameter_that_may_have_moved_is_told_beside_the_effect(corrected: Path) -> None:

@@ -19,7 +19,9 @@ from regolithd.calibration.mismatch.selection.shape_optimisation import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+
+    from regolithd.calibration.mismatch import Problem
 
 
 @pytest.mark.parametrize("top", [0.0, 0.31, 1.7, 4.0])
@@ -113,6 +115,31 @@ def test_a_shape_is_made_to_agree_with_its_coefficients() -> None:
     extended, term = optimised_shape(equations, (), term_of(equations, "self-consistent"))
     assert term.group.shape == {"bent": 0.3}
     assert extended.design.size == equations.design.size + 1
+
+
+class Saturating(SelfConsistent):
+    """A drag that grows with the square root of its size: half of the way is left after each fit."""
+
+    name = "saturating"
+
+    def shapes(self, problem: object) -> list[dict[str, float | str]]:  # noqa: ARG002
+        """Return a size far from the true one."""
+        return [{"bent": 1.0}]
+
+    def self_consistent_shape(self, problem: object, shape: object, values: object) -> dict[str, float | str]:  # noqa: ARG002
+        """Return the coefficient."""
+        return {"bent": values[0]}  # type: ignore[index]
+
+    def columns(self, problem: Problem, shape: Mapping[str, float | str]) -> np.ndarray:
+        """Return a drag of 1 where the shape is of that size."""
+        return super().columns(problem, {}) / np.sqrt(float(shape["bent"]))
+
+
+def test_few_fits_lead_to_a_shape_that_agrees() -> None:
+    """The fourth is extrapolated from those before: 0.3 is the root of 0.09."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Saturating(),))
+    _, term = optimised_shape(equations, (), term_of(equations, "saturating"))
+    assert term.group.shape["bent"] == pytest.approx(0.09, rel=0.03)
 
 
 class Bend(Power):
