@@ -5,6 +5,10 @@ and lets a delay of half a reading, which is a mean of two, or any law of the sa
 readings scatter about what the readings beside them say is an error, or it is what the input did. The simulation
 decides: the measured column follows its prediction clearly better with inputs smoothed for that error than for the
 stated one, or clearly worse. Else what is stated holds.
+
+Only quick changes decide, and each prediction as late or early as it fits best: a smoothed input has another mean,
+which may make up for physics that is missing, and where a column is late any smoothing brings the prediction nearer to
+it.
 """
 
 from __future__ import annotations
@@ -25,17 +29,24 @@ from regolithd.calibration.mismatch.signal.smoothing_spline import fitted_rows
 from regolithd.calibration.mismatch.signal.wiener_filter import even_pieces, noise_floor
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
 
 Array = NDArray[np.float64]
 
+EXACT = SensorError()
+"""The error of an input that has none."""
 CLEARLY = 5.0
 """Log likelihood ratio from which the scatter of an input is its error (a choice: e⁵ to one)."""
 LEAST_SCATTER = 1e-3
 """Scatter in standard deviations of the input below which it does not matter (a choice)."""
+HALF_WINDOW = 15
+"""Readings on either side of an instant over whose mean a change is quick (a choice: parameters and physics that are
+missing act more slowly, and noise of a few readings is told apart from it)."""
+FURTHEST_SHARE = 0.1
+"""How late or early a column may be, as a share of the recording (a choice: as long as a delay that is looked for)."""
 NEAR = 1.4
 """Factor between scatter and stated error up to which the statement is asked no further (a choice: the variance is
 twice as large)."""
@@ -49,13 +60,15 @@ def shown_errors(
     """Return the errors of inputs whose readings scatter otherwise than stated, where they predict better with these.
 
     `predict` runs the simulation at the stated values; `normal` as in `expected_inputs`. One run for each input that
-    scatters otherwise, and one more.
+    scatters otherwise, and one more. An input whose error is stated to be 0 is exact.
     """
     otherwise = {}
     for name in simulation.inputs:
         if name in as_read.channels and name != simulation.channel:
-            stated_error = simulation.sensors.get(name, SensorError())
-            error = _by_scatter(as_read.channels[name], as_read.time_s, as_read.run, stated_error)
+            stated_error = simulation.sensors.get(name)
+            if stated_error == EXACT:
+                continue
+            error = _by_scatter(as_read.channels[name], as_read.time_s, as_read.run, stated_error or EXACT)
             if error is not None:
                 otherwise[name] = error
     if not otherwise:
@@ -68,9 +81,70 @@ def shown_errors(
             prediction = predict(as_stated.with_channels(**{name: smooth}))
         except SimulationError:  # it accepts no other inputs than those recorded
             continue
-        left = as_read.channel(simulation.channel) - prediction
-        if FirstOrder.of([left]).log_likelihood_ratio(stated - prediction, left) < -CLEARLY:
+        if _closer(as_read.channel(simulation.channel), prediction, stated, as_read.runs) > CLEARLY:
             found[name] = error
+    return found
+
+
+def _closer(measured: Array, one: Array, other: Array, runs: Sequence[slice]) -> float:
+    """Return by how much the log likelihood of quick changes is larger with one prediction than with another.
+
+    All are of shape (time, wheel), with NaN where nothing is known.
+    """
+    known = np.where(np.isfinite(one + other), measured, np.nan)
+    target, *predictions = (_quick(np.where(np.isfinite(known), each, np.nan), runs) for each in (known, one, other))
+    left = [_left_when_best_timed(target, each, runs) for each in predictions]
+    both = np.isfinite(left[0] + left[1])
+    of_one, of_other = (np.where(both, each, np.nan) for each in left)
+    least = min((of_one, of_other), key=lambda each: float(np.nansum(each**2)))
+    return -FirstOrder.of([least]).log_likelihood_ratio(of_one - of_other, of_one)
+
+
+def _quick(values: Array, runs: Sequence[slice]) -> Array:
+    """Return values (time, wheel) less their mean over a window about each instant, within each run."""
+    found = np.full(values.shape, np.nan)
+    for rows in runs:
+        known, at = np.isfinite(values[rows]), np.arange(rows.stop - rows.start)
+        first, end = np.maximum(at - HALF_WINDOW, 0), np.minimum(at + HALF_WINDOW + 1, len(at))
+        summed = (np.cumsum(np.where(known, values[rows], 0.0), axis=0), np.cumsum(known, axis=0))
+        total, count = (np.pad(each, ((1, 0), (0, 0)))[end] - np.pad(each, ((1, 0), (0, 0)))[first] for each in summed)
+        found[rows] = values[rows] - total / np.maximum(count, 1)
+    return found
+
+
+def _left_when_best_timed(target: Array, prediction: Array, runs: Sequence[slice]) -> Array:
+    """Return what a prediction leaves of a target, both (time, wheel), as late or early as leaves the least."""
+    squares = np.zeros(2 * int(FURTHEST_SHARE * len(target)) + 1)
+    counts = np.zeros(squares.shape)
+    for rows in runs:
+        one, other = target[rows], prediction[rows]
+        seen, said = (np.isfinite(each).astype(np.float64) for each in (one, other))
+        one, other = np.nan_to_num(one), np.nan_to_num(other)
+        counts += _correlations(seen, said, len(counts))
+        squares += _correlations(one**2, said, len(counts)) + _correlations(seen, other**2, len(counts))
+        squares -= 2 * _correlations(one, other, len(counts))
+    enough = counts > counts.max() / 2
+    lag = int(np.argmin(np.where(enough, squares / np.maximum(counts, 1.0), np.inf))) - len(counts) // 2
+    return target - _later(prediction, lag, runs)
+
+
+def _correlations(one: Array, other: Array, count: int) -> Array:
+    """Return Σ one(t) other(t − lag) over columns (time, wheel), of so many lags, from the earliest to the latest."""
+    size, half = len(one) + len(other), count // 2
+    spectra = np.fft.rfft(one, size, axis=0) * np.conj(np.fft.rfft(other, size, axis=0))
+    found = np.fft.irfft(spectra.sum(axis=1), size)
+    lags = np.arange(-half, half + 1)
+    return np.where(np.abs(lags) < len(one), found[np.clip(lags, 1 - len(one), len(one) - 1)], 0.0)
+
+
+def _later(values: Array, readings: int, runs: Sequence[slice]) -> Array:
+    """Return values (time, wheel) so many readings later within each run, NaN where there are none."""
+    found = np.full(values.shape, np.nan)
+    for rows in runs:
+        count = rows.stop - rows.start - abs(readings)
+        if count > 0:
+            to, of = (rows.start + max(sign * readings, 0) for sign in (1, -1))
+            found[to : to + count] = values[of : of + count]
     return found
 
 

@@ -35,10 +35,10 @@ class Slide(Simulation):
         return values["gain_A_N"] * inputs["load_N"]
 
 
-def stated(error_N: float) -> Slide:
-    """Return the simulation with this error of the load."""
+def stated(error_N: float | None) -> Slide:
+    """Return the simulation with this error of the load, or with none stated."""
     found = Slide()
-    found.sensors = {"load_N": SensorError(absolute=error_N)}
+    found.sensors = {} if error_N is None else {"load_N": SensorError(absolute=error_N)}
     return found
 
 
@@ -64,8 +64,8 @@ def test_scatter_is_white_noise_and_neither_steps_nor_slow_courses() -> None:
     assert scatter(noise + swing + strokes, time, run) == pytest.approx(1.0, rel=0.15)
 
 
-@pytest.mark.parametrize("said", [0.0, 1.5])
-def test_the_error_that_the_readings_show_is_taken_and_told(said: float) -> None:
+@pytest.mark.parametrize("said", [None, 1.5])
+def test_the_error_that_the_readings_show_is_taken_and_told(said: float | None) -> None:
     """Where none is stated, and where half of it is."""
     inputs = inputs_of(recorded(1, felt=False), stated(said))
     of_statement = f"a stated error of {said:.2g}" if said else "no stated error"
@@ -85,6 +85,47 @@ def test_what_the_drive_feels_is_no_error() -> None:
     np.testing.assert_array_equal(inputs.expected.channels["load_N"], recording.channels["load_N"])
     assert inputs.expected.notes == ()
     assert inputs_of(recorded(1, felt=False), stated(ERROR_N)).expected.notes == ()
+
+
+def test_an_input_that_is_stated_to_be_exact_is_taken_as_it_was_read() -> None:
+    """Also where it predicts better with an error."""
+    recording = recorded(1, felt=False)
+    inputs = inputs_of(recording, stated(0.0))
+    np.testing.assert_array_equal(inputs.expected.channels["load_N"], recording.channels["load_N"])
+    assert inputs.expected.notes == ()
+
+
+class Heated(Simulation):
+    """A block whose temperature follows the power of its burner, and loses heat."""
+
+    channel, unit = "block_degC", "degC"
+    inputs = ("burner_kW",)
+    parameters: ClassVar = {"loss": Prior(0.02, 0.001, "1/s")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the temperature, from the first reading on."""
+        found = np.array(inputs["block_degC"])
+        for k in range(1, len(found)):
+            found[k] = found[k - 1] + 0.01 * inputs["burner_kW"][k - 1] - values["loss"] * found[k - 1]
+        return found
+
+
+@pytest.mark.parametrize(("lost", "late"), [(0.0, 0), (0.03, 0), (0.0, 3), (0.0, 40)])
+@pytest.mark.parametrize("noisy", [False, True])
+def test_neither_missing_physics_nor_a_delay_passes_for_an_error(lost: float, late: int, *, noisy: bool) -> None:
+    """A burner that changes from reading to reading heats the block; its sensor's noise does not."""
+    random = np.random.default_rng(8)
+    slow = 400 + 200 * np.sin(np.arange(COUNT) / 70)
+    read = slow * (1 + 0.25 * random.normal(size=COUNT))
+    heat, block = slow if noisy else read, np.zeros(COUNT)
+    block[0] = 200.0
+    for k in range(1, COUNT):
+        extra = lost * (block[k - 1] / 200) ** 4
+        block[k] = block[k - 1] + 0.01 * heat[k - 1] - 0.02 * block[k - 1] - extra
+    block += 0.5 * random.normal(size=COUNT)
+    columns = {"t_s": np.arange(COUNT) * 1.0, "burner_kW": np.roll(read, late), "block_degC": block}
+    notes = inputs_of(from_columns(columns), Heated()).expected.notes
+    assert bool(notes) == noisy
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
