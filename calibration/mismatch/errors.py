@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-NEAR = 0.7
-"""Share of the letters that a name has in common with the one that was perhaps meant (a choice; difflib's ratio)."""
+NEAR = 0.66
+"""Share of the letters that a name has in common with the one that was perhaps meant (a choice: two of three; difflib's
+ratio)."""
 MOST_NAMES = 20
 """Names that a message lists at most."""
 

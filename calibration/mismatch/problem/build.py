@@ -91,9 +91,13 @@ def build_problem(
     not_compared = left_out(simulation.channel, measured, run, faults, blanks, labels)
     if mask.sum() < thresholds.fewest_readings:
         reasons = "".join(f"; {each.readings} are not: {each.reason}" for each in not_compared)
+        silent = np.isfinite(measured) & ~np.isfinite(prediction)
+        cure = ""
+        if 2 * silent.sum() > np.isfinite(measured).sum():
+            cure = f"; `predict` returns NaN from {prepared.time_s[silent.any(axis=1)][0]:.6g} s on: look there first"
         raise RecordingError(
             f"only {mask.sum()} values of {simulation.channel} can be compared; "
-            f"at least {thresholds.fewest_readings} are needed{reasons}"
+            f"at least {thresholds.fewest_readings} are needed{reasons}{cure}"
         )
     return Problem(
         recording=prepared,

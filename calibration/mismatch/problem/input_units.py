@@ -1,17 +1,19 @@
-"""Columns that are likely in another unit than their names say: converted, the simulation leaves far less."""
+"""Columns that are likely in another unit than their names say, or swapped: the simulation leaves far less then."""
 
 from __future__ import annotations
 
 import re
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
+from regolithd.calibration.mismatch.problem.covariates import quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
@@ -27,6 +29,13 @@ CONVERSIONS: dict[str, tuple[tuple[float, float, str], ...]] = {
     "deg_s": ((180 / np.pi, 0.0, "rad/s"), (6.0, 0.0, "rpm")),
     "rpm": ((30 / np.pi, 0.0, "rad/s"), (60.0, 0.0, "revolutions per second")),
     "m_s": ((1 / 3.6, 0.0, "km/h"),),
+    "m3_h": ((0.06, 0.0, "l/min"), (3.6, 0.0, "l/s"), (3600.0, 0.0, "m³/s")),
+    "m3_s": ((1 / 3600, 0.0, "m³/h"), (1 / 60000, 0.0, "l/min"), (1e-3, 0.0, "l/s")),
+    "l_min": ((1 / 0.06, 0.0, "m³/h"), (60.0, 0.0, "l/s"), (1e-3, 0.0, "ml/min")),
+    "l_s": ((1 / 60, 0.0, "l/min"), (1 / 3.6, 0.0, "m³/h"), (1e3, 0.0, "m³/s")),
+    "kg_s": ((1 / 3600, 0.0, "kg/h"), (1e-3, 0.0, "g/s")),
+    "kg_h": ((3600.0, 0.0, "kg/s"), (1e3, 0.0, "t/h")),
+    "t_h": ((1e-3, 0.0, "kg/h"), (3.6, 0.0, "kg/s")),
     "Pa": ((100.0, 0.0, "mbar"), (1e3, 0.0, "kPa"), (1e5, 0.0, "bar")),
     "kPa": ((1e-3, 0.0, "Pa"), (0.1, 0.0, "mbar"), (100.0, 0.0, "bar")),
     "bar": ((1e-3, 0.0, "mbar"), (1e-5, 0.0, "Pa"), (1e-2, 0.0, "kPa")),
@@ -56,6 +65,10 @@ LEFT_PREDICTED = 0.1
 """The same of the predicted column, over its variance (a choice: converted, the simulation explains it well)."""
 BEYOND_ALL = 1e100
 """What no prediction reaches, in any unit."""
+LEAST = 1e-300
+"""Variance of a column that does not change."""
+LEAST_TOLD = 1e-3
+"""Share of a mean square below which a number says no more."""
 LEAST_KNOWN = 0.2
 """Share of the readings that have to be predicted for that (a choice)."""
 
@@ -66,66 +79,110 @@ def notes_on_units(
     predict: Callable[[Recording], Array],
     predicted: Callable[[], Array],
 ) -> Iterator[str]:
-    """Yield a note for each input that is likely in another unit.
+    """Yield a note on the column that is likely in another unit, or on the two that are swapped.
+
+    Of several mistakes that is told with which the simulation leaves least. Swaps are tried where a unit seems to be
+    wrong, or the simulation is worse than the mean of what it predicts.
 
     `predict` runs the simulation as it is stated; `predicted` returns what it predicts from the readings as they are.
 
     Raises
     ------
     RecordingError
-        Where the simulation, from the readings as they are, is worse than the mean of what it predicts; and where that
-        is in another unit.
+        Where the simulation, from the readings as they are, is worse than the mean of what it predicts, or that is in
+        another unit.
     """
-    measured, columns = recording.channel(simulation.channel), simulation.inputs
-    _check_predicted(simulation.channel, measured, predicted)
-    mistakable = [(name, found[1]) for name in columns if (found := MISTAKABLE.fullmatch(name))]
-    recorded = [(name, unit) for name, unit in mistakable if name in recording.channels]
-    if not recorded:
+    measured, channel = recording.channel(simulation.channel), simulation.channel
+    if not np.isfinite(measured).any():
         return
     as_read, variance = _power(measured - predicted()), float(np.nanvar(measured))
+    recorded = [name for name in simulation.inputs if name in recording.channels]
 
-    def left_by(name: str, factor: float, offset: float) -> float:
-        converted = recording.with_channels(**{name: factor * recording.channel(name) + offset})
+    def left_by(**columns: Array) -> float:
+        """Return the mean square left with these columns, over the variance of what is predicted then."""
+        other = recording.with_channels(**columns)
         try:
-            return _power(measured - predict(converted))
+            return _power(other.channel(channel) - predict(other)) / max(
+                float(np.nanvar(other.channel(channel))), LEAST
+            )
         except (RecordingError, SimulationError):
             return float("inf")
 
-    def likely(name: str, stated: str) -> Iterator[tuple[float, str]]:
-        for factor, offset, unit in CONVERSIONS[stated]:
-            left = left_by(name, factor, offset)
-            if left < LEFT_CONVERTED * as_read and (
-                offset or factor > 1 or left < LEFT_SHRUNK * left_by(name, 0.0, 0.0)
-            ):
-                yield left, unit
-
-    for name, stated in recorded if as_read > LEFT_AS_READ * variance else ():
-        left, unit = min(likely(name, stated), default=(0.0, ""))
-        if not unit:
-            continue
-        told = (
-            f"{name} is likely in {unit}: converted from that, the simulation leaves {left / as_read:.1g} of "
-            f"the mean square that it leaves of {simulation.channel} now. Convert the column to {stated}, or "
-            f"correct the simulation if it takes it so; another column with wrong values may look like that, too"
-        )
-        if as_read > variance:
-            raise RecordingError(told)
-        yield f"{told}."
-
-
-def _check_predicted(channel: str, measured: Array, predicted: Callable[[], Array]) -> None:
-    """Raise an error where the predicted column is likely in another unit: its readings explain nothing as they are."""
-    stated = MISTAKABLE.fullmatch(channel)
-    if stated is None or not np.isfinite(measured).any():
+    share = as_read / max(variance, LEAST)
+    found = list(_other_units(recording, recorded, share, left_by)) if share > LEFT_AS_READ else []
+    of_channel = list(_other_unit_predicted(channel, measured, predicted))
+    found += of_channel
+    useless = share > 1 or bool(of_channel)
+    if share > LEFT_AS_READ:
+        found += _swapped(recording, recorded, channel, share, left_by, alike=not (found or useless))
+    if not found:
         return
-    prediction, variance = predicted(), float(np.nanvar(measured))
-    for factor, offset, unit in CONVERSIONS[stated[1]]:
+    left, mistake, cure = min(found)
+    told = (
+        f"{mistake}: with that put right, the simulation leaves {_in_words(left / share)} of the mean square that it "
+        f"leaves of {channel} now. {cure}; another column with wrong values may look like that, too"
+    )
+    if useless:
+        raise RecordingError(told)
+    yield f"{told}."
+
+
+def _in_words(share: float) -> str:
+    return f"{share:.1g}" if share >= LEAST_TOLD else f"less than {LEAST_TOLD:g}"
+
+
+def _mistakable_unit(column: str) -> str:
+    found = MISTAKABLE.fullmatch(column)
+    return found[1] if found else ""
+
+
+def _other_units(
+    recording: Recording, inputs: Sequence[str], share: float, left_by: Callable[..., float]
+) -> Iterator[tuple[float, str, str]]:
+    """Yield what is left, the mistake and the cure for each input that is likely in another unit."""
+    for name in inputs:
+        stated = _mistakable_unit(name)
+        for factor, offset, unit in CONVERSIONS.get(stated, ()):
+            readings = recording.channel(name)
+            left = left_by(**{name: factor * readings + offset})
+            if left < LEFT_CONVERTED * share and (
+                offset or factor > 1 or left < LEFT_SHRUNK * left_by(**{name: 0.0 * readings})
+            ):
+                cure = f"Convert the column to {stated}, or correct the simulation if it takes it so"
+                yield left, f"{name} is likely in {unit}", cure
+
+
+def _other_unit_predicted(
+    channel: str, measured: Array, predicted: Callable[[], Array]
+) -> Iterator[tuple[float, str, str]]:
+    """Yield the same of the predicted column, where its readings explain nothing as they are."""
+    stated, prediction, variance = _mistakable_unit(channel), predicted(), float(np.nanvar(measured))
+    for factor, offset, unit in CONVERSIONS.get(stated, ()):
         left = _power(factor * measured + offset - prediction)
         if left < LEFT_PREDICTED * factor**2 * variance and _power(measured - prediction) > variance / 2:
-            raise RecordingError(
-                f"{channel} is likely in {unit}: converted from that, it is predicted with an error of {left**0.5:.1g} "
-                f"{stated[1]}. Convert the column to {stated[1]}, or correct the simulation if it predicts {unit}"
-            )
+            cure = f"Convert the column to {stated}, or correct the simulation if it predicts {unit}"
+            yield left / (factor**2 * variance), f"{channel} is likely in {unit}", cure
+
+
+def _swapped(
+    recording: Recording,
+    inputs: Sequence[str],
+    channel: str,
+    share: float,
+    left_by: Callable[..., float],
+    *,
+    alike: bool,
+) -> Iterator[tuple[float, str, str]]:
+    """Yield the same of each pair of columns that likely have each other's readings; `alike`: only of the same unit."""
+    others = [name for name in recording.channels if name not in (channel, *inputs)]
+    pairs = [*combinations((channel, *inputs), 2), *product((channel, *inputs), others)]
+    for one, other in pairs:
+        units = {name.removeprefix(quantity(name)) for name in (one, other)}
+        if alike and (len(units) > 1 or units == {""}):
+            continue
+        left = left_by(**{one: recording.channel(other), other: recording.channel(one)})
+        if left < min(LEFT_CONVERTED * share, LEFT_PREDICTED):
+            yield left, f"{one} and {other} likely have each other's readings", "Swap the names of the columns"
 
 
 def _power(left: Array) -> float:

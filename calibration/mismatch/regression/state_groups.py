@@ -28,7 +28,7 @@ ON_STATE = "on a state"
 
 
 def with_state_terms(design: DesignMatrix) -> DesignMatrix:
-    """Add, for each covariate, a smooth term that acts on a state; nothing where the simulation has none.
+    """Add, over each covariate and time, a smooth term that acts on a state; nothing where the simulation has none.
 
     It acts as drag where the machine has a direction, and else as it is.
     """
@@ -39,10 +39,12 @@ def with_state_terms(design: DesignMatrix) -> DesignMatrix:
     couplings = couplings_of(problem)
     factor = couplings["drag" if "drag" in couplings else "offset"]
     for name, values in problem.covariates.items():
-        if name == "time" or not has_smooth_term(problem, name) or not varies_with_time(problem, values):
+        if not has_smooth_term(problem, name) or not varies_with_time(problem, values):
             continue
         known = bridged(np.abs(values) if name == "wheel_speed" else values)
-        hats = hat_functions(known, np.isfinite(known), problem.thresholds.curve_knots)
+        limits = problem.thresholds
+        knots = limits.state_time_knots if name == "time" else limits.curve_knots
+        hats = hat_functions(known, np.isfinite(known), knots)
         columns = [through_state(problem, hat * np.nan_to_num(bridged(factor)), memory) for hat in hats]
         design = with_group(design, name, columns, ON_STATE)
     return design

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
+from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean, listed
 from regolithd.calibration.mismatch.simulation.checked import checked
 from regolithd.calibration.mismatch.simulation.corrected_curves import stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
@@ -86,7 +86,10 @@ def model_folder(tables: Mapping[str, Any], beside: Path) -> Path:
 def _loaded(
     tables: Mapping[str, Any], beside: Path, source: Path | None, announce: Callable[[str], None]
 ) -> Simulation:
-    table = tables.get("simulation", {})
+    if "simulation" not in tables:
+        there = listed(f"[{name}]" for name in tables)
+        raise SimulationError(f"there is no table [simulation], whose {MODELS}; the file has {there}")
+    table = tables["simulation"]
     model = table.get("model") if isinstance(table, dict) else None
     if not isinstance(model, str):
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))

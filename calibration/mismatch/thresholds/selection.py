@@ -23,6 +23,11 @@ class SelectionThresholds:
     time_knots: int = threshold(
         48, "Knots of a smooth term over time.", f"{CHOICE}: spells down to a fortieth of the recording have to show"
     )
+    state_time_knots: int = threshold(
+        16,
+        "Knots over time of what acts on a state, which remembers it for some time.",
+        f"{CHOICE}: a flow that comes and goes four times is followed, and noise that lasts as long hardly",
+    )
     least_variance_within: float = threshold(
         0.2,
         "Share of a covariate's variance within wheels, below which no smooth term is made of it.",

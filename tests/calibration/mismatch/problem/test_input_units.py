@@ -142,3 +142,46 @@ def test_of_several_units_the_one_that_fits_best_is_told() -> None:
     }
     with pytest.raises(RecordingError, match="speed_rad_s is likely in rpm"):
         build_problem(from_columns(table), Turning())
+
+
+class Pumping(Climbing):
+    """A current that grows with a flow, and with the square of the difference of two temperatures."""
+
+    inputs = ("flow_m3_h", "inlet_degC", "outlet_degC")
+    parameters: ClassVar = {"flow_A": Prior(3.0, 0.1, "A h/m³")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the current."""
+        warmer = inputs["outlet_degC"] - 1.5 * inputs["inlet_degC"]
+        return values["flow_A"] * inputs["flow_m3_h"] + 0.01 * warmer**2
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the flow."""
+        return {"flow": inputs["flow_m3_h"]}
+
+
+def pumped() -> dict[str, Array]:
+    """Return a recording of it."""
+    rows = np.arange(ROWS)
+    flow, inlet, outlet = 2 + np.sin(rows / 60), 20 + 3 * np.sin(rows / 150), 45 + 5 * np.sin(rows / 90)
+    current = 3 * flow + 0.01 * (outlet - 1.5 * inlet) ** 2 + RNG.normal(0, 0.05, ROWS)
+    return {"t_s": rows * 0.1, "motor_A": current, "flow_m3_h": flow, "inlet_degC": inlet, "outlet_degC": outlet}
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("flow_m3_h", "inlet_degC"), ("inlet_degC", "outlet_degC"), ("motor_A", "outlet_degC"), ("motor_A", "flow_m3_h")],
+)
+def test_columns_that_have_each_other_s_readings_are_told(one: str, other: str) -> None:
+    """Two inputs, or an input and what is predicted: no unit is told in their place."""
+    right = pumped()
+    assert build_problem(from_columns(right), Pumping()).recording.notes == ()
+    with pytest.raises(RecordingError, match=rf"{one} and {other} likely have each other's readings: .*Swap the names"):
+        build_problem(from_columns({**right, one: right[other], other: right[one]}), Pumping())
+
+
+def test_a_flow_in_another_unit_is_told() -> None:
+    """Litres per minute are no cubic metres per hour."""
+    right = pumped()
+    with pytest.raises(RecordingError, match="flow_m3_h is likely in l/min"):
+        build_problem(from_columns({**right, "flow_m3_h": right["flow_m3_h"] / 0.06}), Pumping())

@@ -88,13 +88,13 @@ def test_what_acted_on_a_state_is_taken_back_from_what_it_shows() -> None:
     assert not before_state(problem, acting[:length], MEMORY_s)[1].any()
 
 
-def _aired(seed: int, lost_K: float, noise_memory: float = 0.0) -> Recording:
+def _aired(seed: int, lost_K: float, noise_memory: float = 0.0, times_as_long: float = 1.0) -> Recording:
     """Return a recording of a room whose window is open now and then; noise of 0.5 K, a half of it slow."""
     random = np.random.default_rng(seed)
     current = np.repeat(random.uniform(8, 20, ROWS // 50), 50)
     is_open, rows = np.zeros(ROWS), 0
     while rows < ROWS:
-        shut, aired = random.exponential(120), random.uniform(20, 50)
+        shut, aired = times_as_long * random.exponential(120), times_as_long * random.uniform(20, 50)
         is_open[int(rows + shut) : int(rows + shut + aired)] = 1
         rows += int(shut + aired)
     slow = np.zeros(ROWS)
@@ -109,6 +109,13 @@ def _aired(seed: int, lost_K: float, noise_memory: float = 0.0) -> Recording:
 def test_what_comes_and_goes_before_a_state_is_unexplained(seed: int) -> None:
     """A window that is opened now and then: the temperature follows slowly, as slow noise does."""
     answer = compare(_aired(seed, 8.0, 0.9), Room()).answer
+    assert (answer.verdict, [each.covariate for each in answer.unexplained]) == ("unexplained", ["time"])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_comes_and_goes_a_few_times_is_told_over_time(seed: int) -> None:
+    """It is no noise that lasts for long, and follows no other covariate."""
+    answer = compare(_aired(seed, 1.5, times_as_long=4.0), Room()).answer
     assert (answer.verdict, [each.covariate for each in answer.unexplained]) == ("unexplained", ["time"])
 
 
