@@ -54,7 +54,7 @@ def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Seque
     `wheels` are all that the recording has; empty: not known. On a terminal, lines that continue are indented; a file
     or a pipe gets each on one line.
     """
-    doubt = doubt_of(answer.probability)
+    doubt = doubt_of(answer)
     console.print(f"[bold]{answer.verdict}[/bold]{f', {doubt}' if doubt else ''}")
     for line in _lines(answer, labels, wheels):
         console.print(escape(_wrapped(line, console.width if console.is_terminal else 0)), soft_wrap=True)

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import CalibratedParameter, OtherAnswer, Parameter, Unexplained
+    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, OtherAnswer, Parameter, Unexplained
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -45,6 +45,10 @@ REFUSED = "refused, though likelier by evidence alone"
 """What another answer is that has more evidence, and failed a test of its own."""
 WRONG_RATHER_THAN_RIGHT = "more probably wrong than right"
 """What an answer is that has less than half of the evidence of all."""
+AS_PROBABLE = "no more probable than the next answer"
+"""What an answer is that another one equals: two causes that cannot be told apart."""
+AS_PROBABLE_FROM = 0.8
+"""Share of the probability from which on another answer is as probable (a choice: its evidence is within 0.5)."""
 
 EVEN = 0.5
 """Probability below which the answer is more probably wrong than right."""
@@ -54,9 +58,13 @@ LEAST_SHARE = 0.005
 """Share of the residual below which 0 % would be told."""
 
 
-def doubt_of(probability: float | None) -> str:
-    """Return `WRONG_RATHER_THAN_RIGHT` for such an answer; nothing for others, and of an unknown probability."""
-    return WRONG_RATHER_THAN_RIGHT if probability is not None and probability < EVEN else ""
+def doubt_of(answer: Answer) -> str:
+    """Return `WRONG_RATHER_THAN_RIGHT`, or `AS_PROBABLE`, for such an answer; nothing for others."""
+    probability, other = answer.probability, answer.next_best
+    if probability is None or probability >= EVEN:
+        return ""
+    alike = other is not None and AS_PROBABLE_FROM * probability <= other.probability <= probability / AS_PROBABLE_FROM
+    return AS_PROBABLE if alike else WRONG_RATHER_THAN_RIGHT
 
 
 def without_name(other: OtherAnswer) -> list[str]:

@@ -132,11 +132,11 @@ def certainty(answer: Answer, labels: Labels) -> Certainty:
     """Return how sure the answer is of its names."""
     given = "unknown" if answer.probability is None else f"{answer.probability:.2f}"
     if (other := answer.next_best) is None:
-        return Certainty(given, doubt=doubt_of(answer.probability))
+        return Certainty(given, doubt=doubt_of(answer))
     names = [*map(labels.effect, other.effects), *without_name(other)]
     order = REFUSED if answer.probability is not None and other.probability > answer.probability else "next best"
     told = f"{order}: {listed(names or ['nothing missing'])} ({other.probability:.2f})"
-    return Certainty(given, told, doubt_of(answer.probability))
+    return Certainty(given, told, doubt_of(answer))
 
 
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:

@@ -321,6 +321,8 @@ def test_the_next_best_answer_is_told_where_it_is_not_negligible() -> None:
     assert doubtful.next == "refused, though likelier by evidence alone: nothing missing (0.91)"
     assert doubtful.doubt == "more probably wrong than right"
     assert certainty(replace(refused, probability=0.5), labels).doubt == ""
+    twin = replace(refused, probability=0.48, alternatives=(OtherAnswer(("coulomb-friction",), False, 0.47),))
+    assert certainty(twin, labels).doubt == "no more probable than the next answer"
 
 
 def test_a_curve_that_several_ranges_have_is_drawn_once(evidence: Evidence) -> None:
