@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.data.slow_channels import rows_apart, rows_held
-from regolithd.calibration.mismatch.problem.state_memory import memory_s
-from regolithd.calibration.mismatch.problem.words import word_for
+from regolithd.calibration.mismatch.problem.state_memory import memory_s, through_state
+from regolithd.calibration.mismatch.problem.words import with_article, word_for
+from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
+from regolithd.calibration.mismatch.regression.smooth_groups import with_group
 from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
 
 if TYPE_CHECKING:
@@ -78,11 +82,31 @@ def _note_on_lags(decision: Decision) -> tuple[str, ...]:
 def _notes_on_states(decision: Decision) -> tuple[str, ...]:
     """Return a note on each covariate over which something acts on a state of the simulation."""
     problem = decision.equations.problem
-    names = [term.name for term in decision.unnamed if term.group.coupling == ON_STATE]
-    memory = float(f"{memory_s(problem):.2g}") if names else 0.0
-    return tuple(
-        f"What is unexplained over the {word_for(name, problem.labels)} acts on a state of the simulation, which shows "
-        f"it for about {memory:g} s: it is left out of a balance, as of heat, of volume or of forces. No curve over it "
-        f"is fitted."
-        for name in dict.fromkeys(names)
-    )
+    terms = {term.name: term for term in decision.unnamed if term.group.coupling == ON_STATE}
+    memory = float(f"{memory_s(problem):.2g}") if terms else 0.0
+    notes = []
+    for name, term in terms.items():
+        over = with_article(name, problem.labels)
+        note = (
+            f"What is unexplained over {over} acts on a state of the simulation, which shows it for about {memory:g} "
+            "s: it is left out of a balance, as of heat, of volume or of forces. No curve over it is fitted."
+        )
+        if _is_a_constant(decision, term):
+            note += (
+                f" It hardly depends on {over}: a constant in the balance explains as much, and so does an offset of "
+                f"the readings of {problem.simulation.channel}, with the first of which the simulation begins."
+            )
+        notes.append(note)
+    return tuple(notes)
+
+
+def _is_a_constant(decision: Decision, term: Term) -> bool:
+    """Return whether a term's coefficients gain less beyond a constant on the state than they are charged."""
+    problem, equations = decision.equations.problem, decision.equations
+    constant = through_state(problem, np.ones(problem.mask.shape), memory_s(problem))
+    design = with_group(equations.design, term.name, [constant], ON_STATE)
+    rest = [each for each in decision.whole.terms if each is not term]
+    beside = equations.over(design)
+    as_told, alone = (beside.fit((*rest, each)) for each in (term, Term(design.groups[-1], term.wheels)))
+    further = len(term.group.columns) - 1
+    return as_told.delta_chi2 - alone.delta_chi2 < equations.thresholds.coefficient_penalty * further

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.problem.words import word_for
+from regolithd.calibration.mismatch.problem.words import with_article, word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 from regolithd.calibration.mismatch.regression.smooth_groups import is_constant, same_covariate
+from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
 from regolithd.calibration.mismatch.selection.law_misfit import is_of_the_prediction
@@ -28,12 +29,12 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     As much but for the share that an inexact law may leave (`form_misfit`): knots lie otherwise over another covariate.
     A curve over time has knots enough to follow what changes seldom, and is another cause only where it explains more.
     Where several things stay unexplained, each has been told beside the others. What comes and goes has no covariate;
-    no curve follows a sine.
+    no curve follows a sine. Beside what acts on a state, curves that act so count as well.
     """
     if len({term.name for term in decision.unnamed}) != 1 or decision.intermittent:
         return ()
     told, problem = decision.unnamed[0], decision.equations.problem
-    if told.group.coupling in WITHOUT_CURVE or is_constant(told):
+    if told.group.coupling in WITHOUT_CURVE - {ON_STATE} or is_constant(told):
         return ()
     scores = _scores_over(decision, told)
     most = scores.get(told.name, float("inf"))
@@ -45,9 +46,9 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     ]
     if not others:
         return ()
-    here = word_for(told.name, problem.labels)
-    there = " and the ".join(word_for(name, problem.labels) for name in others)
-    note = f"What is unexplained over the {here} follows the {there} nearly as well"
+    here = with_article(told.name, problem.labels)
+    there = " and ".join(with_article(name, problem.labels) for name in others)
+    note = f"What is unexplained over {here} follows {there} nearly as well"
     why = "they go together in this recording, or it hardly depends on any of them"
     return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)
 
@@ -117,8 +118,9 @@ def notes_on_a_curve_in_place(decision: Decision, others: Sequence[Alternative])
 
 def _scores_over(decision: Decision, told: Term) -> dict[str, float]:
     """Return the best score of a curve over each covariate, on the wheels of the one that is told, best first."""
+    without = WITHOUT_CURVE - {told.group.coupling}
     scores: dict[str, float] = {}
     for score, term in best_of_each_smooth_term(decision.equations, decision.named.terms):
-        if term.wheels == told.wheels and term.group.coupling not in WITHOUT_CURVE:
+        if term.wheels == told.wheels and term.group.coupling not in without:
             scores.setdefault(term.name, score)
     return scores

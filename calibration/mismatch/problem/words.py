@@ -113,6 +113,12 @@ def word_for(covariate: str, labels: Mapping[str, str]) -> str:
     return labels.get(covariate, COVARIATES.get(covariate, covariate.replace("_", " "))).split(" (")[0]
 
 
+def with_article(covariate: str, labels: Mapping[str, str]) -> str:
+    """Return the same with its article, which time has none of: "the wind", "time"."""
+    word = word_for(covariate, labels)
+    return word if covariate == "time" else f"the {word}"
+
+
 def in_words(text: str, labels: Mapping[str, str]) -> str:
     """Return a text with each covariate in braces, as {wheel_speed}, in the machine's own words."""
     return WORD_IN_BRACES.sub(lambda found: word_for(found[1], labels), text)

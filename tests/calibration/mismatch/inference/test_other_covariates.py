@@ -69,7 +69,7 @@ def test_what_follows_a_covariate_that_changes_slowly_is_told_over_that(period_s
     power = 20.0 * flow + bump + rng.normal(0, 3.0, len(t_s))
     found = compare(from_columns({"t_s": t_s, "flow_l_s": flow, "pressure_kPa": pressure, "power_W": power}), Pump())
     assert [each.covariate for each in found.answer.unexplained] == ["pressure"]
-    assert any("over the pressure follows the time nearly as well" in note for note in found.answer.notes)
+    assert any("over the pressure follows time nearly as well" in note for note in found.answer.notes)
 
 
 class Stirrer(Simulation):

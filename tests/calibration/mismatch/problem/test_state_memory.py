@@ -75,6 +75,27 @@ def test_a_draught_is_located_over_the_wind(seed: int) -> None:
     assert compare(recorded(seed, error_A=0.0), Room()).answer.verdict == "consistent"
 
 
+class FromFirstReading(Room):
+    """A room whose simulation begins with its first reading."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the temperature: what it began with is forgotten."""
+        begun = inputs["room_degC"][0] * np.exp(-inputs["t_s"] / values["memory_s"])
+        return super().predict(inputs, values) + begun
+
+
+@pytest.mark.parametrize(("offset_K", "draught_K", "constant"), [(3.0, 0.0, True), (0.0, 3.0, False)])
+def test_an_offset_of_the_readings_is_a_constant_in_the_balance(
+    offset_K: float, draught_K: float, *, constant: bool
+) -> None:
+    """The simulation begins with it and forgets it; a note says that nothing else has to vary."""
+    read = recorded(2, draught_K=draught_K, error_A=0.0)
+    answer = compare(read.with_channels(room_degC=read.channels["room_degC"] + offset_K), FromFirstReading()).answer
+    assert answer.verdict == "unexplained"
+    (note,) = [each for each in answer.notes if "acts on a state" in each]
+    assert ("so does an offset of the readings of room_degC" in note) == constant
+
+
 def test_what_acted_on_a_state_is_taken_back_from_what_it_shows() -> None:
     """Means of it, where all readings of a run are there."""
     recording = recorded(3)
