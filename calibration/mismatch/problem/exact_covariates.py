@@ -8,12 +8,19 @@ that follows the angle, as if physics were missing that depends on it.
 
 An exact column may follow the error all the same: a controller acts on the reading, or it was computed from it. By the
 truth more is taken out than a smoother takes of errors of the stated size, and by the error itself no more.
+
+Of an input that changes much from reading to reading, smoothing leaves most of the error, and exact columns together
+may say more of it than the readings beside it: the head of a compressor is a function of its flow and speed. The
+expectation is then that of a normal density about their joint regression (a polynomial of second degree), unless its
+mean square error is larger (Stein's unbiased estimate). Else what the error does to the prediction follows these
+columns.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,7 +51,16 @@ LEAST_OF_TRUTH = 1 / 2
 """What was taken out beyond errors of the stated size, as a share of what follows exact inputs (a choice: half way
 between that of errors, which is none, and that of the truth, which is all; 1.3 to 4 in five recordings of a loom)."""
 READINGS_A_KNOT = 10
-"""Readings for each knot from which it is asked (a choice: the function has a tenth of the error then)."""
+"""Readings for each knot, or term of a polynomial, from which it is asked (a choice: the function has a tenth of the
+error then)."""
+WORSE = 1.1
+"""Factor by which the mean square error given all columns may be larger (a choice: a model of time alone may be finer,
+and its error follows these columns all the same)."""
+BESIDE = (-4, -3, -2, -1, 1, 2, 3, 4)
+"""Readings beside each one that predict it too (a choice: an input that changes much is not told by further ones)."""
+MOST_TAKEN = 0.8
+"""Share of an error's variance up to which a joint regression is asked (a choice: where it would take all of it, an
+error that is stated too large leaves the regression alone)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +69,11 @@ class _Exact:
 
     Attributes
     ----------
-    known: where it was measured, shape (time,)
+    values, known: what was measured, and where, shape (time,)
     between: as it is
     """
 
+    values: Array
     known: NDArray[np.bool_]
     between: KnotPlaces
 
@@ -65,7 +82,7 @@ class _Exact:
         """Return it for values (time,), None where these hardly vary."""
         known = np.isfinite(values)
         between = KnotPlaces.of(values, known, KNOTS)
-        return None if between is None else cls(known, between)
+        return None if between is None else cls(values, known, between)
 
     def followed_by(self, values: Array, uncertain: NDArray[np.bool_]) -> tuple[float, Array]:
         """Return by how much more than chance values (time,) follow this, in Δχ², and the function of it (time,)."""
@@ -145,13 +162,77 @@ def _completed(read: Array, smooth: Array, error: SensorError, smoother: Smoothe
             break
         found = found + np.where(uncertain, functions[best][1] * deviation, 0.0)
         del left[best]
-    if found is smooth:
-        return smooth
-    before, after = (float(np.mean(((read - each) / of_error)[uncertain] ** 2)) for each in (smooth, found))
-    of_truth = before - _taken_of_errors(read, deviation, smoother, uncertain)
-    if of_truth < LEAST_OF_TRUTH * (before - after):
-        return smooth
+    if found is not smooth:
+        before, after = (float(np.mean(((read - each) / of_error)[uncertain] ** 2)) for each in (smooth, found))
+        of_truth = before - _taken_of_errors(read, deviation, smoother, uncertain)
+        found = smooth if of_truth < LEAST_OF_TRUTH * (before - after) else found
+    jointly = _given_jointly(read, found, of_error, smoother, others, uncertain)
+    found = found if jointly is None else jointly
     return np.where(np.sign(found) == np.sign(smooth), found, smooth)
+
+
+def _given_jointly(
+    read: Array,
+    alone: Array,
+    deviation: Array,
+    smoother: Smoother,
+    others: Sequence[_Exact],
+    uncertain: NDArray[np.bool_],
+) -> Array | None:
+    """Return the expectation (time,) given the readings and all exact columns together; None: `alone` is as good.
+
+    About a polynomial of second degree in the columns, and the readings beside, the truth is normal. It is asked where
+    what `alone` takes out of the readings follows that polynomial, by the truth and not by the error.
+    """
+    rows = uncertain & np.all([other.known for other in others], axis=0) if others else uncertain & False
+    terms = _terms([other.values[rows] for other in others])
+    if not others or len(terms) * READINGS_A_KNOT > rows.sum():
+        return None
+    taken_out = ((read - alone) / deviation)[rows]
+    power = float(np.mean(taken_out**2))
+    explained = float(np.mean(_fitted(terms, taken_out) * taken_out))
+    gain = explained / max(power - explained, 1e-300) * (rows.sum() - len(terms))
+    of_truth = power - _taken_of_errors(read, deviation, smoother, rows)
+    if gain <= quantile(len(terms), LEVEL) or of_truth < LEAST_OF_TRUTH * explained:
+        return None
+    error = deviation[rows] ** 2
+    left = read[rows] - _fitted([*terms, *_beside(read)[:, rows]], read[rows])
+    of_the_truth = max(float(np.sum(left**2)) / (rows.sum() - len(terms) - len(BESIDE)) - float(np.mean(error)), 0.0)
+    taken = error / (of_the_truth + error)
+    least = power - 1 + 2 * _kept_of_errors(read, deviation, smoother, rows)
+    if float(np.mean(taken)) > MOST_TAKEN or 1 - float(np.mean(taken)) > WORSE * least:
+        return None
+    found = alone.copy()
+    found[rows] = read[rows] - taken * left
+    return found
+
+
+def _fitted(terms: Sequence[Array], values: Array) -> Array:
+    """Return the least-squares fit of values by terms, each of shape (reading,)."""
+    design = np.stack(terms, axis=1)
+    return np.asarray(design @ np.linalg.lstsq(design, values, rcond=SINGULAR)[0])
+
+
+def _terms(columns: Sequence[Array]) -> list[Array]:
+    """Return a constant, the columns in standard deviations about their means, and their products by pairs."""
+    if not columns:
+        return []
+    scaled = [(each - each.mean()) / (float(each.std()) or 1.0) for each in columns]
+    return [np.ones(len(scaled[0])), *scaled, *(a * b for a, b in combinations_with_replacement(scaled, 2))]
+
+
+def _beside(read: Array) -> Array:
+    """Return the readings before and after each (time,), on straight lines across blanks, shape (neighbour, time)."""
+    at, known = np.arange(len(read)), np.isfinite(read)
+    filled = np.interp(at, at[known], read[known])
+    return np.stack([filled[np.clip(at + lag, 0, len(read) - 1)] for lag in BESIDE])
+
+
+def _kept_of_errors(read: Array, deviation: Array, smoother: Smoother, where: NDArray[np.bool_]) -> float:
+    """Return the mean share of an error of a reading (time,) that a smoother keeps in its own estimate."""
+    drawn = np.random.default_rng(0).normal(size=len(read))
+    kept = smoother(read + deviation * drawn) - smoother(read)
+    return float(np.mean((drawn * kept / deviation)[where]))
 
 
 def _taken_of_errors(read: Array, deviation: Array, smoother: Smoother, uncertain: NDArray[np.bool_]) -> float:

@@ -55,11 +55,16 @@ ORDERS = (2, 3, 4, 5)
 
 
 def shown_errors(
-    as_read: Recording, simulation: Predictor, predict: Callable[[Recording], Array], normal: Collection[str] = ()
+    as_read: Recording,
+    simulation: Predictor,
+    predict: Callable[[Recording], Array],
+    expect: Callable[[], Recording],
+    normal: Collection[str] = (),
 ) -> dict[str, SensorError]:
     """Return the errors of inputs whose readings scatter otherwise than stated, where they predict better with these.
 
-    `predict` runs the simulation at the stated values; `normal` as in `expected_inputs`. One run for each input that
+    `predict` runs the simulation at the stated values, `expect` returns the recording with the inputs that are expected
+    by the stated errors; `normal` as in `expected_inputs`. One run for each input that
     scatters otherwise, and one more. An input whose error is stated to be 0 is exact.
     """
     otherwise = {}
@@ -73,7 +78,7 @@ def shown_errors(
                 otherwise[name] = error
     if not otherwise:
         return {}
-    found, as_stated = {}, expected_inputs(as_read, simulation.sensors, normal)
+    found, as_stated = {}, expect()
     stated = predict(as_stated)
     for name, error in otherwise.items():
         smooth = expected_inputs(as_read, {name: error}, normal).channels[name]

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
+    from regolithd.calibration.mismatch.problem.prior import SensorError
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]
@@ -141,18 +142,27 @@ def inputs_of(
     )
     as_read, blanks = _prepared(recording, simulation)
     normal = _inputs_of_speed(as_read, simulation)
-    shown = shown_errors(as_read, simulation, predict, normal)
+
+    def exact_beside(made: ExpectedInputs) -> list[str]:
+        # Columns that the simulation derives may have the errors of those that they are derived from.
+        return [name for name in recording.channels if name not in made.smoothers and name != simulation.channel]
+
+    def expected_of(made: ExpectedInputs, errors: Mapping[str, SensorError]) -> Recording:
+        return given_exact_covariates(as_read, made, errors, exact_beside(made))
+
+    as_stated = cache(lambda: smoothed_inputs(as_read, simulation.sensors, normal))
+    shown = shown_errors(as_read, simulation, predict, lambda: expected_of(as_stated(), simulation.sensors), normal)
     errors = {**simulation.sensors, **shown}
-    made = (
-        smoothed_inputs(as_read, errors, normal) if not smoothed else ExpectedInputs(as_read.with_channels(**smoothed))
-    )
-    # Columns that the simulation derives may have the errors of those that they are derived from.
-    exact = [name for name in recording.channels if name not in made.smoothers and name != simulation.channel]
-    expected = given_exact_covariates(as_read, made, errors, exact)
+    if smoothed:
+        made = ExpectedInputs(as_read.with_channels(**smoothed))
+    else:
+        made = smoothed_inputs(as_read, errors, normal) if shown else as_stated()
+    expected = expected_of(made, errors)
     otherwise = None
     if blanks:
         other_way, _ = _prepared(recording, simulation, other_way=True)
-        otherwise = given_exact_covariates(other_way, smoothed_inputs(other_way, errors, normal), errors, exact)
+        made_otherwise = smoothed_inputs(other_way, errors, normal)
+        otherwise = given_exact_covariates(other_way, made_otherwise, errors, exact_beside(made))
     predicted = cache(lambda: predict(as_read))
     between = _between_readings(recording, simulation, values, predicted)
     by_errors = input_doubt(as_read, expected, simulation, values, errors, made.smoothers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from regolithd.calibration.mismatch import SensorError
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
@@ -99,3 +100,19 @@ def test_each_axis_has_its_own_angle() -> None:
     )
     both = given_exact_covariates(shared, smoothed_inputs(shared, ERRORS), ERRORS, ("angle",)).channels["tension"]
     np.testing.assert_array_equal(both[:, 0], both[:, 1])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_columns_together_tell_of_an_input_that_changes_much(seed: int) -> None:
+    """The head of a compressor is a function of its flow and speed: what is left of the error follows neither."""
+    random = np.random.default_rng(seed)
+    speed = 1 + 0.2 * np.sin(np.arange(ROWS) / 90)
+    flow = 1000 * speed * (1 + 0.15 * np.convolve(random.normal(size=ROWS), (0.8, 0.6), "same"))
+    head = speed**2 * (1.25 - 0.3 * (flow / speed / 1000) ** 2) * (1 + 0.02 * random.normal(size=ROWS))
+    recorded = recording(flow + ERROR * random.normal(size=ROWS), head=head, speed=speed)
+    smooth, found = completed(recorded, ("head", "speed"))
+    for_speed = head / speed**2
+    place = np.searchsorted(np.quantile(for_speed, np.linspace(0, 1, 13)[1:-1]), for_speed)
+    before, after = (np.array([(each - flow)[place == k].mean() for k in range(12)]) for each in (smooth, found))
+    assert np.sqrt(np.mean(after**2)) < 0.4 * np.sqrt(np.mean(before**2))
+    assert np.std(found - flow) < np.std(smooth - flow)
