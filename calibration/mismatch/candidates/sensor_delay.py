@@ -8,7 +8,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.lag_scan import best_lag
-from regolithd.calibration.mismatch.problem.delayed import filtered, shifted, smoothed
+from regolithd.calibration.mismatch.problem.delayed import Restart, filtered, restart_of, shifted, smoothed
 from regolithd.calibration.mismatch.problem.fitted_variant import over_fitted_value
 from regolithd.calibration.mismatch.problem.limits import at_limit
 from regolithd.calibration.mismatch.signal.stretches import stretches
@@ -149,7 +149,12 @@ class SensorDelay(Candidate):
         for kind, delayed in OF_CHANNEL.items():
             if kind in shape:
                 delay = float(shape[kind])
-                behind = delayed(problem.recording, _without_blanks(problem, delay), delay)
+                behind = delayed(
+                    problem.recording,
+                    _without_blanks(problem, delay),
+                    delay,
+                    restart_of(problem.recording, problem.prediction, problem.measured, delay),
+                )
                 return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
         late, delay = str(shape["late"]), float(shape[OF_INPUT])
         return (float(shape.get(PASSED, 1.0)) * _change(problem, late, delay) / delay)[None]
@@ -299,8 +304,8 @@ def _standing(direction: Array, first: int, end: int) -> slice:
     return slice(still, still + int(other[-1]) + 1 if other.size else still)
 
 
-OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
-    "secant_s": lambda recording, values, delay: shifted(recording, values, -delay),
+OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float, Restart | None], Array]] = {
+    "secant_s": lambda recording, values, delay, _: shifted(recording, values, -delay),
     "filter_s": filtered,
     "smoothing_s": smoothed,
 }
@@ -331,7 +336,9 @@ def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
     if problem.late is None or problem.late[1] == 0:
         return columns
     kind, delay = problem.late
-    late = [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay)) for column in columns]
+    restart = restart_of(problem.recording, problem.prediction, problem.measured, delay)
+    restart = restart and restart.of_a_change
+    late = [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay, restart)) for column in columns]
     if not problem.late_on:
         return late
     on = np.isin(np.arange(problem.mask.shape[1]), problem.late_on)

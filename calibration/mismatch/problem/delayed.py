@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,33 +17,83 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FEWEST_OF_A_LINE = 3
+"""Readings through which a straight line is drawn, at least."""
 
-def filtered(recording: Recording, values: Array, time_constant_s: float) -> Array:
+
+@dataclass(frozen=True, eq=False)
+class Restart:
+    """Where a filter's output is known, shape (time, wheel): it goes on from there, whatever it was fed with before.
+
+    Attributes
+    ----------
+    where: the rows
+    output, fed: what it put out there, and what it was fed with; 0 elsewhere
+    """
+
+    where: NDArray[np.bool_]
+    output: Array
+    fed: Array
+
+    @property
+    def of_a_change(self) -> Restart:
+        """What a change of the values does not change."""
+        return Restart(self.where, np.zeros(self.output.shape), np.zeros(self.fed.shape))
+
+
+def restart_of(recording: Recording, prediction: Array, measured: Array, delay_s: float) -> Restart | None:
+    """Return what a filter has put out, and was fed with, where a prediction (time, wheel) is NaN for the last time.
+
+    The readings are the filter's output: a straight line through the last of them, of a third of the delay, tells it
+    and its slope, and with that what goes in. None where there are too few.
+    """
+    blank = np.isnan(prediction)
+    last = blank & ~np.pad(blank, ((0, 1), (0, 0)), constant_values=True)[1:]
+    count = max(int(np.ceil(delay_s / recording.step_s / 3)), FEWEST_OF_A_LINE)
+    where, output, fed = np.zeros(blank.shape, np.bool_), np.zeros(blank.shape), np.zeros(blank.shape)
+    for row, k in np.argwhere(last).tolist():
+        rows = np.arange(max(row - count + 1, 0), row + 1)
+        rows = rows[blank[rows, k] & np.isfinite(measured[rows, k]) & (recording.run[rows] == recording.run[row])]
+        if len(rows) < FEWEST_OF_A_LINE:
+            continue
+        times, readings = recording.time_s[rows] - recording.time_s[row], measured[rows, k]
+        about = times - times.mean()
+        slope = float(about @ readings) / float(about @ about)
+        where[row, k], output[row, k] = True, float(readings.mean()) - slope * float(times.mean())
+        fed[row, k] = output[row, k] + slope * delay_s
+    return Restart(where, output, fed) if where.any() else None
+
+
+def filtered(recording: Recording, values: Array, time_constant_s: float, restart: Restart | None = None) -> Array:
     """Return values (time, wheel) behind a first-order filter, exact for straight lines between readings.
 
     Each run begins at its first value; so does what follows a gap.
     """
     decay = float(np.exp(-recording.step_s / time_constant_s))
     slope = (1 - decay) * time_constant_s / recording.step_s
+    fed = values if restart is None else np.where(restart.where, restart.fed, values)
     added = (1 - slope) * values
-    added[1:] += (slope - decay) * values[:-1]
-    return _of_first_order(recording, values, decay, added)
+    added[1:] += (slope - decay) * fed[:-1]
+    return _of_first_order(recording, values, decay, added, restart)
 
 
-def smoothed(recording: Recording, values: Array, time_constant_s: float) -> Array:
+def smoothed(recording: Recording, values: Array, time_constant_s: float, restart: Restart | None = None) -> Array:
     """Return values (time, wheel) as an exponential smoothing of their readings: y_k = a y_(k−1) + (1 − a) x_k.
 
     A digital filter is that, with a = exp(−step / time constant). Each run begins at its first value, as above.
     """
     decay = float(np.exp(-recording.step_s / time_constant_s))
-    return _of_first_order(recording, values, decay, (1 - decay) * values)
+    return _of_first_order(recording, values, decay, (1 - decay) * values, restart)
 
 
-def _of_first_order(recording: Recording, values: Array, decay: float, added: Array) -> Array:
+def _of_first_order(recording: Recording, values: Array, decay: float, added: Array, restart: Restart | None) -> Array:
     """Return what decays from one reading to the next and is added to, from the first value of each run on."""
     begins = np.concatenate(([True], ~recording.without_gap))
     added[begins] = values[begins]
-    return recursion(np.where(begins, 0.0, decay)[:, None], added)
+    factor = np.where(begins, 0.0, decay)[:, None]
+    if restart is not None:
+        added, factor = np.where(restart.where, restart.output, added), np.where(restart.where, 0.0, factor)
+    return recursion(factor, added)
 
 
 def shifted(recording: Recording, values: Array, by_s: float, on: Sequence[int] = ()) -> Array:

@@ -184,10 +184,10 @@ def _given_jointly(
     About a polynomial of second degree in the columns, and the readings beside, the truth is normal. It is asked where
     what `alone` takes out of the readings follows that polynomial, by the truth and not by the error.
     """
-    rows = uncertain & np.all([other.known for other in others], axis=0) if others else uncertain & False
-    terms = _terms([other.values[rows] for other in others])
-    if not others or len(terms) * READINGS_A_KNOT > rows.sum():
+    rows = np.all([uncertain, *(other.known for other in others)], axis=0)
+    if not others or rows.sum() < READINGS_A_KNOT * (1 + len(others)) * (2 + len(others)) / 2:
         return None
+    terms = _terms([other.values[rows] for other in others])
     taken_out = ((read - alone) / deviation)[rows]
     power = float(np.mean(taken_out**2))
     explained = float(np.mean(_fitted(terms, taken_out) * taken_out))
@@ -215,8 +215,6 @@ def _fitted(terms: Sequence[Array], values: Array) -> Array:
 
 def _terms(columns: Sequence[Array]) -> list[Array]:
     """Return a constant, the columns in standard deviations about their means, and their products by pairs."""
-    if not columns:
-        return []
     scaled = [(each - each.mean()) / (float(each.std()) or 1.0) for each in columns]
     return [np.ones(len(scaled[0])), *scaled, *(a * b for a, b in combinations_with_replacement(scaled, 2))]
 

@@ -113,6 +113,21 @@ def test_a_late_channel_reports_at_a_start_what_it_was_at_standstill(kind: str) 
     assert np.isfinite(column[problem.mask]).all()
 
 
+@pytest.mark.parametrize("kind", ["filter_s", "smoothing_s"])
+def test_a_filter_goes_on_from_what_it_put_out_at_a_standstill(kind: str) -> None:
+    """It has not forgotten the motion before when the next begins, whatever the current was meanwhile."""
+    load, moving = loads()
+    recorded = late(np.where(moving > 0.5, load, 1 + np.sin(TIME_S / 50)), kind, 3.0)
+    problem = problem_of(recorded, load, moving)
+    (column,) = DELAY.columns(problem, {"late": "current_A", kind: 3.0})
+    behind = (problem.prediction + 3.0 * column)[problem.mask]
+    np.testing.assert_allclose(behind[100:], problem.measured[problem.mask][100:], atol=0.05)
+    whole = replace(problem, late=(kind, 3.0))
+    (shown,) = as_shown(whole, [problem.tangent("gain")])
+    begun = np.flatnonzero(np.diff(moving) > 0)[3:]
+    assert np.abs(shown[begun]).max() < 1e-9
+
+
 def test_without_a_reading_a_straight_line_bridges_the_gap() -> None:
     """So that one blank does not blank a filter's whole run."""
     load, moving = loads()
