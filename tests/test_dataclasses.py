@@ -85,6 +85,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "TimedSpells",
         "Beside",
         "Responses",
+        "Restart",
         "Unnamed",
         "HeldOutSquares",
         "Usual",
