@@ -71,9 +71,10 @@ class SelectionThresholds:
     )
     # Regression
     least_tolerance: float = threshold(
-        1e-4,
+        1e-5,
         "Tolerance (1 / variance inflation factor) below which a column counts as a combination of the others.",
-        "standard: 1e-4 is the usual limit of stepwise regression (SPSS); sums are in single precision",
+        f"{CHOICE}: rounding of the sums in single precision is a hundredth of it; whether what is left of a column "
+        "explains anything is told by its Δχ²",
     )
     active_share: float = threshold(
         0.4,
