@@ -79,6 +79,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "_InNoise",
         "_Spectra",
         "_Fitted",
+        "_Drawn",
         "Addition",
         "Asked",
         "Bands",

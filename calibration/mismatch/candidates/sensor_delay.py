@@ -24,6 +24,8 @@ FINEST_READINGS = 2.0
 LEAST_READINGS = 1.25
 """Shortest delay that is named, in readings: what a sampled input does between two readings is not recorded, and a
 solver that holds it, or interpolates it, is early or late by up to one (a choice: a quarter of a reading more)."""
+DEAD_TIME = "secant_s"
+"""The shape parameter that holds the dead time of the predicted channel."""
 OF_INPUT = "input_secant_s"
 """The shape parameter that holds the dead time of an input."""
 PASSED = "passed"
@@ -146,15 +148,11 @@ class SensorDelay(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""
-        for kind, delayed in OF_CHANNEL.items():
+        for kind in OF_CHANNEL:
             if kind in shape:
                 delay = float(shape[kind])
-                behind = delayed(
-                    problem.recording,
-                    _without_blanks(problem, delay),
-                    delay,
-                    restart_of(problem.recording, problem.prediction, problem.measured, delay),
-                )
+                restart = None if kind == DEAD_TIME else restart_of(problem, delay)
+                behind = OF_CHANNEL[kind](problem.recording, _without_blanks(problem, delay), delay, restart)
                 return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
         late, delay = str(shape["late"]), float(shape[OF_INPUT])
         return (float(shape.get(PASSED, 1.0)) * _change(problem, late, delay) / delay)[None]
@@ -305,7 +303,7 @@ def _standing(direction: Array, first: int, end: int) -> slice:
 
 
 OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float, Restart | None], Array]] = {
-    "secant_s": lambda recording, values, delay, _: shifted(recording, values, -delay),
+    DEAD_TIME: lambda recording, values, delay, _: shifted(recording, values, -delay),
     "filter_s": filtered,
     "smoothing_s": smoothed,
 }
@@ -336,7 +334,7 @@ def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
     if problem.late is None or problem.late[1] == 0:
         return columns
     kind, delay = problem.late
-    restart = restart_of(problem.recording, problem.prediction, problem.measured, delay)
+    restart = None if kind == DEAD_TIME else restart_of(problem, delay)
     restart = restart and restart.of_a_change
     late = [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay, restart)) for column in columns]
     if not problem.late_on:

@@ -83,9 +83,10 @@ def with_changes_beside_same_parameters(decision: Decision) -> Decision:
     nothing is weighed. A change that was told already, beside parameters anywhere within their priors, is weighed again
     where these might have moved instead: its size is better known beside parameters as they were.
     """
-    for term in () if decision.unnamed else decision.whole.terms:
+    changes = [] if decision.unnamed else [term for term in decision.whole.terms if _place(term.group) is not None]
+    for term in changes:
         rest = _without(decision, term)
-        told = [each for each in _weighed(rest) if each.change[0].subject == term.group.subject]
+        told = [each for each in _weighed(rest) if _place(each.change[0]) == _place(term.group)]
         if told and _is_refuted(rest, told[0]) and told[0].says_changed and told[0].lead < CERTAIN_LEAD:
             decision = _with_change(rest, told[0])
     for _ in decision.equations.problem.stated:

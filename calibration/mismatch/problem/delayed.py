@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -41,16 +42,28 @@ class Restart:
         return Restart(self.where, np.zeros(self.output.shape), np.zeros(self.fed.shape))
 
 
-def restart_of(recording: Recording, prediction: Array, measured: Array, delay_s: float) -> Restart | None:
-    """Return what a filter has put out, and was fed with, where a prediction (time, wheel) is NaN for the last time.
+def restart_of(problem: Problem, delay_s: float) -> Restart | None:
+    """Return what a filter has put out, and was fed with, where the simulation says nothing for the last time.
 
     The readings are the filter's output: a straight line through the last of them, of a third of the delay, tells it
     and its slope, and with that what goes in. None where there are too few.
     """
-    blank = np.isnan(prediction)
+    count = max(int(np.ceil(delay_s / problem.recording.step_s / 3)), FEWEST_OF_A_LINE)
+    where, output, slope = problem.lately(("last lines", count), lambda: _last_lines(problem, count))
+    return Restart(where > 0, output, output + slope * delay_s) if where.any() else None
+
+
+def _last_lines(problem: Problem, count: int) -> Array:
+    """Return straight lines through so many readings before the prediction goes on after it was NaN.
+
+    Returns
+    -------
+    Shape (3, time, wheel): in the last row where it is NaN 1, the line's value there, and its slope; 0 elsewhere, and
+    where there are too few readings.
+    """
+    recording, measured, blank = problem.recording, problem.measured, np.isnan(problem.prediction)
     last = blank & ~np.pad(blank, ((0, 1), (0, 0)), constant_values=True)[1:]
-    count = max(int(np.ceil(delay_s / recording.step_s / 3)), FEWEST_OF_A_LINE)
-    where, output, fed = np.zeros(blank.shape, np.bool_), np.zeros(blank.shape), np.zeros(blank.shape)
+    found = np.zeros((3, *blank.shape))
     for row, k in np.argwhere(last).tolist():
         rows = np.arange(max(row - count + 1, 0), row + 1)
         rows = rows[blank[rows, k] & np.isfinite(measured[rows, k]) & (recording.run[rows] == recording.run[row])]
@@ -59,9 +72,8 @@ def restart_of(recording: Recording, prediction: Array, measured: Array, delay_s
         times, readings = recording.time_s[rows] - recording.time_s[row], measured[rows, k]
         about = times - times.mean()
         slope = float(about @ readings) / float(about @ about)
-        where[row, k], output[row, k] = True, float(readings.mean()) - slope * float(times.mean())
-        fed[row, k] = output[row, k] + slope * delay_s
-    return Restart(where, output, fed) if where.any() else None
+        found[:, row, k] = 1.0, float(readings.mean()) - slope * float(times.mean()), slope
+    return found
 
 
 def filtered(recording: Recording, values: Array, time_constant_s: float, restart: Restart | None = None) -> Array:

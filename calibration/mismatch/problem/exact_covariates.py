@@ -32,7 +32,7 @@ from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.hat_basis import KnotPlaces
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.errors_in_variables import ExpectedInputs
@@ -153,6 +153,7 @@ def _completed(read: Array, smooth: Array, error: SensorError, smoother: Smoothe
     deviation = ReadingScale.of(read, error).error(smooth)
     uncertain = np.isfinite(read) & np.isfinite(smooth) & (smooth != 0) & (deviation > 0)
     of_error = np.where(uncertain, deviation, 1.0)
+    drawn = cache(lambda: _Drawn.of(read, deviation, smoother))
     found, left = smooth, list(others)
     while left:
         taken_out = np.where(uncertain, (read - found) / of_error, 0.0)
@@ -164,9 +165,9 @@ def _completed(read: Array, smooth: Array, error: SensorError, smoother: Smoothe
         del left[best]
     if found is not smooth:
         before, after = (float(np.mean(((read - each) / of_error)[uncertain] ** 2)) for each in (smooth, found))
-        of_truth = before - _taken_of_errors(read, deviation, smoother, uncertain)
+        of_truth = before - drawn().taken_out(uncertain)
         found = smooth if of_truth < LEAST_OF_TRUTH * (before - after) else found
-    jointly = _given_jointly(read, found, of_error, smoother, others, uncertain)
+    jointly = _given_jointly(read, found, of_error, drawn, others, uncertain)
     found = found if jointly is None else jointly
     return np.where(np.sign(found) == np.sign(smooth), found, smooth)
 
@@ -175,7 +176,7 @@ def _given_jointly(
     read: Array,
     alone: Array,
     deviation: Array,
-    smoother: Smoother,
+    drawn: Callable[[], _Drawn],
     others: Sequence[_Exact],
     uncertain: NDArray[np.bool_],
 ) -> Array | None:
@@ -192,14 +193,13 @@ def _given_jointly(
     power = float(np.mean(taken_out**2))
     explained = float(np.mean(_fitted(terms, taken_out) * taken_out))
     gain = explained / max(power - explained, 1e-300) * (rows.sum() - len(terms))
-    of_truth = power - _taken_of_errors(read, deviation, smoother, rows)
-    if gain <= quantile(len(terms), LEVEL) or of_truth < LEAST_OF_TRUTH * explained:
+    if gain <= quantile(len(terms), LEVEL) or power - drawn().taken_out(rows) < LEAST_OF_TRUTH * explained:
         return None
     error = deviation[rows] ** 2
     left = read[rows] - _fitted([*terms, *_beside(read)[:, rows]], read[rows])
     of_the_truth = max(float(np.sum(left**2)) / (rows.sum() - len(terms) - len(BESIDE)) - float(np.mean(error)), 0.0)
     taken = error / (of_the_truth + error)
-    least = power - 1 + 2 * _kept_of_errors(read, deviation, smoother, rows)
+    least = power - 1 + 2 * drawn().mean_kept(rows)
     if float(np.mean(taken)) > MOST_TAKEN or 1 - float(np.mean(taken)) > WORSE * least:
         return None
     found = alone.copy()
@@ -226,15 +226,24 @@ def _beside(read: Array) -> Array:
     return np.stack([filled[np.clip(at + lag, 0, len(read) - 1)] for lag in BESIDE])
 
 
-def _kept_of_errors(read: Array, deviation: Array, smoother: Smoother, where: NDArray[np.bool_]) -> float:
-    """Return the mean share of an error of a reading (time,) that a smoother keeps in its own estimate."""
-    drawn = np.random.default_rng(0).normal(size=len(read))
-    kept = smoother(read + deviation * drawn) - smoother(read)
-    return float(np.mean((drawn * kept / deviation)[where]))
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """Errors of the readings that were drawn, and what a smoother keeps of them, shape (time,) in their deviations."""
 
+    errors: Array
+    kept: Array
 
-def _taken_of_errors(read: Array, deviation: Array, smoother: Smoother, uncertain: NDArray[np.bool_]) -> float:
-    """Return what a smoother takes of errors of the readings (time,), as a share of their mean square."""
-    drawn = np.random.default_rng(0).normal(size=len(read))
-    kept = smoother(read + deviation * drawn) - smoother(read)
-    return float(np.mean((drawn[uncertain] - (kept[uncertain] / deviation[uncertain])) ** 2))
+    @classmethod
+    def of(cls, read: Array, deviation: Array, smoother: Smoother) -> _Drawn:
+        """Draw errors with this deviation, shape (time,), and smooth the readings (time,) with them."""
+        errors = np.random.default_rng(0).normal(size=len(read))
+        kept = smoother(read + deviation * errors) - smoother(read)
+        return cls(errors, kept / np.where(deviation > 0, deviation, 1.0))
+
+    def mean_kept(self, where: NDArray[np.bool_]) -> float:
+        """Return the mean share of an error that the smoother keeps in the estimate of its own reading."""
+        return float(np.mean((self.errors * self.kept)[where]))
+
+    def taken_out(self, where: NDArray[np.bool_]) -> float:
+        """Return what the smoother takes of the errors, as a share of their mean square."""
+        return float(np.mean((self.errors[where] - self.kept[where]) ** 2))

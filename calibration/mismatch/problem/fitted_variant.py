@@ -54,7 +54,7 @@ def at_fitted_value(problem: Problem, shape: Shape, values: Sequence[float], col
     if not 1 / FURTHEST_VALUE <= abs(value / step) <= FURTHEST_VALUE:
         return shape
     try:
-        fitted = sign * replace(problem, variant_value=value).secant(name, value)[problem.mask]
+        fitted = sign * problem.secant(name, value)[problem.mask]
     except SimulationError:
         return shape
     column = columns[0][problem.mask]

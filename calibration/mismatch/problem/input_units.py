@@ -101,10 +101,9 @@ def notes_on_units(
     def left_by(**columns: Array) -> float:
         """Return the mean square left with these columns, over the variance of what is predicted then."""
         other = recording.with_channels(**columns)
+        read = other.channel(channel)
         try:
-            return _power(other.channel(channel) - predict(other)) / max(
-                float(np.nanvar(other.channel(channel))), LEAST
-            )
+            return _power(read - predict(other)) / max(float(np.nanvar(read)), LEAST)
         except (RecordingError, SimulationError):
             return float("inf")
 

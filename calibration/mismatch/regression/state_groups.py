@@ -36,13 +36,12 @@ def with_state_terms(design: DesignMatrix) -> DesignMatrix:
     memory = memory_s(problem)
     if memory == 0:
         return design
-    couplings = couplings_of(problem)
+    couplings, limits = couplings_of(problem), problem.thresholds
     factor = couplings["drag" if "drag" in couplings else "offset"]
     for name, values in problem.covariates.items():
         if not has_smooth_term(problem, name) or not varies_with_time(problem, values):
             continue
         known = bridged(np.abs(values) if name == "wheel_speed" else values)
-        limits = problem.thresholds
         knots = limits.state_time_knots if name == "time" else limits.curve_knots
         hats = hat_functions(known, np.isfinite(known), knots)
         columns = [through_state(problem, hat * np.nan_to_num(bridged(factor)), memory) for hat in hats]
