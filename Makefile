@@ -57,7 +57,7 @@ uninstall: ## remove it; configuration and recordings are kept
 sizing: $(DEV) ## the paper's study of the number of hidden neurons; continues an interrupted run
 	$(BIN)/regolithd sizing
 
-reproduce: $(DEV) ## docs/reproduction.md: the paper's figures beside ours
+reproduce: $(DEV) ## docs/results/reproduction.md: the paper's figures beside ours
 	$(BIN)/regolithd reproduce
 
 evaluate: $(DEV) ## errors and coverage of the soil estimators, delays of the soil-change alarm
@@ -73,19 +73,19 @@ prove-machines: $(DEV) ## the same on five other machines, one of them an FMU (n
 	$(BIN)/python -m regolithd.calibration.validation.machine_trials --cases $(or $(CASES),300) $(if $(SEED),--seed $(SEED))
 
 unnamed: $(DEV) ## what has no name: held-out error with an empirical curve, and the closed forms suggested (SEED=… LIBRARY=1)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.unnamed_effects --seed $(or $(SEED),1) $(if $(LIBRARY),--library) --picture docs/unnamed-effects.svg
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.unnamed_effects --seed $(or $(SEED),1) $(if $(LIBRARY),--library) --picture docs/pictures/unnamed-effects.svg
 
 reliability: $(DEV) ## how often answers are right at their stated probability (BATCHES="folders of prove and prove-machines")
-	$(BIN)/python -m regolithd.calibration.validation.reliability build/figures/reliability.json docs/reliability.svg $(or $(BATCHES),build/prove $(wildcard build/prove-machines/*))
+	$(BIN)/python -m regolithd.calibration.validation.reliability build/figures/reliability.json docs/pictures/reliability.svg $(or $(BATCHES),build/prove $(wildcard build/prove-machines/*))
 
 regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD; 4 minutes (SEEDS=8)
-	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
+	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/pictures/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
 
 slow-noise: $(DEV) ## noise that wanders, told as something or as noise, and weak effects beside it; 5 minutes (COUNT=20 SEED=…)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.slow_noise_study build/figures/slow-noise.json --seed $(or $(SEED),0) --count $(or $(COUNT),20)
 
 experiments: $(DEV) ## the proposed experiment beside a covariate-wise and a random one, in simulation; continues an interrupted run (SEED=… COUNT=20 MACHINE=rover)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.experiment_study build/figures docs --machine $(or $(MACHINE),rover) --seed $(or $(SEED),1) --count $(or $(COUNT),20)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.experiment_study build/figures docs/pictures --machine $(or $(MACHINE),rover) --seed $(or $(SEED),1) --count $(or $(COUNT),20)
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")
 	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real $(ONLY)
@@ -94,13 +94,13 @@ thresholds: $(DEV) ## each threshold of the mismatch engine halved and doubled, 
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.blind_trials.thresholds --seed $(or $(SEED),1) --recordings $(or $(COUNT),40) $(if $(ONLY),--only $(ONLY))
 
 scaling: $(DEV) ## time and memory of a comparison against rows (ROWS=10000000: up to so many), candidates and workers
-	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg $(ROWS)
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/pictures/mismatch-scaling.svg $(ROWS)
 
 online: $(DEV) ## false reports of `regolithd monitor`, and delays of drag that begins half way, beside the whole comparison (10 min)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.online_study build/figures/online.json docs/online.svg
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.online_study build/figures/online.json docs/pictures/online.svg
 
 fleet: $(DEV) ## 100 recordings of five virtual rovers on a local Dask cluster, a worker killed half way (half an hour)
-	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(DRIVES),--drives $(DRIVES)) $(if $(CHECK),--check $(CHECK)) $(if $(PICTURE),--picture docs/mismatch-season.png)
+	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(DRIVES),--drives $(DRIVES)) $(if $(CHECK),--check $(CHECK)) $(if $(PICTURE),--picture docs/pictures/mismatch-season.png)
 
 mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each kind, and in other units (half an hour)
 	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest --timeout 3600 tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py
@@ -134,24 +134,24 @@ holds: $(DEV) ## SIGKILL at 300 points, 10 000 flipped bits, nodes that babble, 
 figures: $(DEV) ## docs/reference/figures.md from build/figures/{chaos,holds,fuzz,bench,audit}.json, those that are there
 	$(BIN)/python tests/bench/figures_page.py
 
-frames: $(DEV) ## time per frame beside python-can and canopen, on vcan; docs/bus.md
+frames: $(DEV) ## time per frame beside python-can and canopen, on vcan; docs/reference/bus.md
 	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark
-	$(BIN)/python -m regolithd.drivers.reference > docs/bus.md
+	$(BIN)/python -m regolithd.drivers.reference > docs/reference/bus.md
 
-pictures: reproduce ## docs/*.svg from the results of sizing, reproduce, evaluate and loop
-	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/loop.svg
+pictures: reproduce ## docs/pictures/*.svg from the results of sizing, reproduce, evaluate and loop
+	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/pictures/loop.svg
 	$(BIN)/regolithd pictures
-	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/demo.svg
+	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/pictures/demo.svg
 
 week: $(DEV) ## the ground's store with a week of one rover at 10 Hz: size and times (10 min, 5 GB of disk)
 	mkdir -p build/figures
 	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_week.py build/figures/week.json
 
-screenshots: $(DEV) ## docs/ground-*.png: the ground page while a virtual rover drives, and after a comparison (5 min; needs mosquitto and chromium)
-	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_pictures.py docs
+screenshots: $(DEV) ## docs/pictures/ground-*.png: the ground page while a virtual rover drives, and after a comparison (5 min; needs mosquitto and chromium)
+	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_pictures.py docs/pictures
 
 picture: $(DEV) ## the README's first figure: the head of a report (needs chromium)
-	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.report_screenshot docs/mismatch-report.png build/picture
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.report_screenshot docs/pictures/mismatch-report.png build/picture
 
 $(VENV)/%.ready: pyproject.toml
 	.ci/virtual-environment $(VENV) $*

@@ -10,5 +10,5 @@ The drivers know no soil and no MQTT. Each folder imports only those above it in
 | `master/` | CiA 302-2, 402-2 | the network: boots, supervises and commands the nodes |
 | `virtual/` | CiA 301 | virtual nodes with the same EDS files, for tests, demo and bench |
 
-`errors` is the tree of exceptions; `reference` writes `docs/bus.md`; `benchmark` measures the time per frame.
+`errors` is the tree of exceptions; `reference` writes `docs/reference/bus.md`; `benchmark` measures the time per frame.
 """

@@ -1,6 +1,6 @@
-"""Writes `docs/bus.md`: identifiers, PDOs, boot configuration and bus load, from the device registry.
+"""Writes `docs/reference/bus.md`: identifiers, PDOs, boot configuration and bus load, from the device registry.
 
-python -m regolithd.drivers.reference > docs/bus.md
+python -m regolithd.drivers.reference > docs/reference/bus.md
 """
 
 from __future__ import annotations

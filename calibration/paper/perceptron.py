@@ -4,7 +4,7 @@ The paper does not specify the following; chosen here:
 
 - Inputs are scaled to [−1, 1] by their minimum and maximum, which the rule of Nguyen and Widrow assumes.
 - Outputs are c in 10 kPa and tan φ. Both are within (0, 1), the range of the sigmoid, and of the scalings tried it is
-  the only one in which the paper's MSE of 0.0251 can be reached (`docs/reproduction.md` lists the others).
+  the only one in which the paper's MSE of 0.0251 can be reached (`docs/results/reproduction.md` lists the others).
 - The output layer has sigmoids too; its initial weights are uniform in [−0.5, 0.5].
 """
 

@@ -1,7 +1,7 @@
 """The paper's training set of 504 pairs (Sec. 3.1, Steps 1–15): inputs [W, i, I], outputs [c, tan φ].
 
 The grid varies soil, current, slip and sinkage independently; the load then follows from Eq. 14 (Step 14). Most of the
-loads are therefore outside what a 30 kg rover can have on one wheel (`docs/reproduction.md`).
+loads are therefore outside what a 30 kg rover can have on one wheel (`docs/results/reproduction.md`).
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def bench(
     interface: Annotated[str, typer.Option(help="python-can's name of the interface type.")] = "socketcan",
     scenario: Annotated[
         Path | None,
-        typer.Option(help="Scenario file (TOML): soils, noise, friction, seed; see docs/virtual-rover.toml."),
+        typer.Option(help="Scenario file (TOML): soils, noise, friction, seed; see docs/reference/virtual-rover.toml."),
     ] = None,
     config: Annotated[Path | None, typer.Option(help="A rover.toml: simulate its nodes instead of Kapvik's.")] = None,
     nodes: Annotated[

@@ -1,4 +1,4 @@
-"""`regolithd pictures`: draw the figures of `regolithd evaluate` for `docs/`."""
+"""`regolithd pictures`: draw the figures of `regolithd evaluate` for `docs/pictures/`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def pictures(
     details: Annotated[Path, typer.Option(help="Ranks and delays of `regolithd evaluate`.")] = Path(
         "build/evaluate.npz"
     ),
-    docs: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path("docs"),
+    docs: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path("docs/pictures"),
 ) -> None:
     """Draw the figures of `regolithd evaluate`: errors, coverage, one sample, alarm delays, drivetrain."""
     import json

@@ -14,7 +14,9 @@ def register(app: typer.Typer) -> None:
 
 
 def reproduce(
-    docs: Annotated[Path, typer.Option(help="Folder for page and pictures.")] = Path("docs"),
+    docs: Annotated[
+        Path, typer.Option(help="Folder of the documentation: the page goes to `results/`, its figures to `pictures/`.")
+    ] = Path("docs"),
     figures: Annotated[Path, typer.Option(help="Write the figures here, as one JSON object.")] = Path(
         "build/figures/reproduce.json"
     ),
@@ -23,7 +25,7 @@ def reproduce(
     ),
     trainings: Annotated[int, typer.Option(min=2, help="Number of networks of the paper's size.")] = 20,
 ) -> None:
-    """Recompute the paper's figures, and write docs/reproduction.md, which compares them with the published ones."""
+    """Recompute the paper's figures, and write the page docs/results/reproduction.md."""
     import json
 
     import numpy as np
@@ -58,13 +60,15 @@ def reproduce(
         noise_free=(float(noise_free[0]), float(noise_free[1])),
         sizing=sized,
     )
-    docs.mkdir(parents=True, exist_ok=True)
-    (docs / "reproduction.md").write_text(page.page(results), encoding="utf-8")
-    pictures.training_set(pairs, docs / "training-set.svg")
-    pictures.traverse(traverses, docs / "traverse.svg")
+    written, drawn = docs / "results" / "reproduction.md", docs / "pictures"
+    for folder in (written.parent, drawn):
+        folder.mkdir(parents=True, exist_ok=True)
+    written.write_text(page.page(results), encoding="utf-8")
+    pictures.training_set(pairs, drawn / "training-set.svg")
+    pictures.traverse(traverses, drawn / "traverse.svg")
     if sized:
-        pictures.sizing(sized, docs / "sizing.svg")
+        pictures.sizing(sized, drawn / "sizing.svg")
     figures.parent.mkdir(parents=True, exist_ok=True)
     figures.write_text(json.dumps(page.figures(results), indent=1) + "\n", encoding="utf-8")
     typer.echo(f"record 500: c {record.cohesion_Pa:.0f} Pa (paper 3352), φ {record.angle_deg:.1f}° (28.6)")
-    typer.echo(f"Wrote {docs / 'reproduction.md'}.")
+    typer.echo(f"Wrote {written}.")

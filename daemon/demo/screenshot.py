@@ -1,4 +1,7 @@
-"""Draw the demo's screen as an SVG, for the README: `python -m regolithd.daemon.demo.screenshot docs/demo.svg`."""
+"""Draw the demo's screen as an SVG, for the README.
+
+python -m regolithd.daemon.demo.screenshot docs/pictures/demo.svg
+"""
 
 from __future__ import annotations
 

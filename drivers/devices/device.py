@@ -1,7 +1,7 @@
 """Description of a kind of device: one frozen `Device` for each, listed in `devices.registry`.
 
 Everything that depends on the kind follows from it: boot configuration, PDO decoding, the key in `rover.toml`, the rows
-of a snapshot, MQTT fields, recorded and exported columns, `docs/bus.md`, and the virtual rover's node.
+of a snapshot, MQTT fields, recorded and exported columns, `docs/reference/bus.md`, and the virtual rover's node.
 """
 
 from __future__ import annotations

@@ -8,6 +8,6 @@ from regolithd.drivers import reference
 
 
 def test_the_bus_document_is_up_to_date() -> None:
-    """The file `docs/bus.md` equals the output of `python -m regolithd.drivers.reference`."""
-    written = Path(__file__).parents[2] / "docs" / "bus.md"
+    """The file `docs/reference/bus.md` equals the output of `python -m regolithd.drivers.reference`."""
+    written = Path(__file__).parents[2] / "docs" / "reference" / "bus.md"
     assert written.read_text() == reference.document()

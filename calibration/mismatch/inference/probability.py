@@ -2,7 +2,7 @@
 
 The posterior probability of an answer among others is proportional to exp(evidence / 2) where noise and laws are exact.
 Neither is, so the difference counts less (`evidence_scale`), and something that no alternative covers may be wrong
-whatever the margin (`highest_probability`). Both were fitted to blind trials (docs/proof.md).
+whatever the margin (`highest_probability`). Both were fitted to blind trials (docs/results/blind-trials.md).
 """
 
 from __future__ import annotations

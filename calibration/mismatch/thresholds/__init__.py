@@ -8,7 +8,7 @@ and doubling each of them costs on blind trials is measured by
 
 Sources: *standard* is a result of statistics that is named; *choice* is a convention or a limit of cost or of interest
 that no experiment decides; *development trials* is a value found on blind trials of seeds that were looked at while the
-engine was written (docs/decisions/050, docs/proof.md), confirmed on seeds that were drawn afterwards.
+engine was written (docs/decisions/050, docs/results/blind-trials.md), confirmed on seeds that were drawn afterwards.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """F1 of localisation and bias of the parameters where laws fail in regions, beside LISDD.
 
-python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg --seeds 8
+python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/pictures/regions.svg --seeds 8
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`docs/reproduction.md`: each of the paper's results that can be recomputed, beside our recomputation."""
+"""`docs/results/reproduction.md`: each of the paper's results that can be recomputed, beside our recomputation."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ On level ground each wheel of a 30 kg rover carries about 49 N. The grid varies 
 {100 * possible:.0f} % of the pairs have a load that a wheel of this rover can carry, most of them LETE sand and
 medium soil. A smaller gain lowers the loads nearly in proportion, and brings other pairs into that range.
 
-![Loads of the 504 pairs](training-set.svg)"""
+![Loads of the 504 pairs](../pictures/training-set.svg)"""
 
 
 def _sizes(results: Results) -> str:
@@ -117,7 +117,7 @@ The means of all 26 sizes lie between {min(means):.5f} and {max(means):.5f}, wit
 the differences between sizes are hardly larger than chance, and much smaller than the differences between
 trainings of one size. Of {figures["trainings"]:.0f} trainings {figures["reached_goal"]:.0f} reached the goal of 0.005.
 
-![MSE by size](sizing.svg)"""
+![MSE by size](../pictures/sizing.svg)"""
 
 
 def _mse(results: Results) -> str:
@@ -209,7 +209,7 @@ current and load propagates to c and φ, and not the differences between the mea
 
 {parts[1]}
 
-![The traverse](traverse.svg)"""
+![The traverse](../pictures/traverse.svg)"""
 
 
 def _bias(results: Results) -> str:

@@ -176,8 +176,8 @@ def test_reproduce_writes_page_pictures_and_figures(tmp_path: Path, monkeypatch:
     printed = regolithd("reproduce", "--trainings", 20, *options)
     assert asked == {"trainings": 20, "unpublished": 5, "best": 0.1}
     assert "record 500: c 3352 Pa (paper 3352), φ 28.6° (28.6)" in printed.stdout
-    assert (docs / "reproduction.md").read_text() == "the page"
-    assert sorted(path.name for path in docs.iterdir()) == ["reproduction.md", "training-set.svg", "traverse.svg"]
+    assert (docs / "results" / "reproduction.md").read_text() == "the page"
+    assert sorted(path.name for path in (docs / "pictures").iterdir()) == ["training-set.svg", "traverse.svg"]
     assert json.loads(figures.read_text()) == {"figure": 1.5}
     (found,) = results
     assert (found.trainings, found.noise_free, found.sizing) == (20, (3300.0, 28.0), None)
@@ -186,7 +186,7 @@ def test_reproduce_writes_page_pictures_and_figures(tmp_path: Path, monkeypatch:
     regolithd("reproduce", "--trainings", 4, *options)
     assert asked["unpublished"] == 2
     assert results[1].sizing == {"sizes": 3}
-    assert (docs / "sizing.svg").read_text() == "sizing"
+    assert (docs / "pictures" / "sizing.svg").read_text() == "sizing"
 
 
 def test_pictures_draws_five(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -179,8 +179,8 @@ def test_a_scenario_file_may_name_soils(tmp_path: Path) -> None:
 
 
 def test_the_annotated_scenario_is_the_default_one() -> None:
-    """`docs/virtual-rover.toml` lists every key with its default."""
-    path = Path(__file__).resolve().parents[3] / "docs" / "virtual-rover.toml"
+    """`docs/reference/virtual-rover.toml` lists every key with its default."""
+    path = Path(__file__).resolve().parents[3] / "docs" / "reference" / "virtual-rover.toml"
     assert read_scenario(path) == Scenario()
     listed = set(re.findall(r"^#? ?(\w+) =", path.read_text(), re.MULTILINE))
     tables = [Scenario, Ground, Motion, SensorNoise, Hidden]

@@ -1,7 +1,7 @@
 """The README's first figure: the top of a report, as a screenshot by Chromium.
 
     module=regolithd.calibration.validation.blind_trials.figures.report_screenshot
-    python -m $module docs/mismatch-report.png build/picture
+    python -m $module docs/pictures/mismatch-report.png build/picture
 
 A generated recording conceals a worn bearing on one wheel and cold lubricant; `regolithd mismatch` writes the report.
 The folder keeps the recording, the answer and the whole report.
