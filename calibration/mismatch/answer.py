@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.contribution import Contribution
-    from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve, StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
-    from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]

@@ -29,7 +29,7 @@ from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.inference.rounding import with_interval
 from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels
-from regolithd.calibration.mismatch.problem.onset_clock import is_later, on_the_clock_of
+from regolithd.calibration.mismatch.problem.corrections.onset_clock import is_later, on_the_clock_of
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.problem.words import in_units, in_words
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Parameter
-    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]

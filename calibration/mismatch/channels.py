@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from regolithd.calibration.mismatch.calibration.step import Step
-from regolithd.calibration.mismatch.inference.contradictions import contradictions, is_told, known_apart, told_apart
-from regolithd.calibration.mismatch.inference.joint_parameters import joint_posterior, known_better_by_others
+from regolithd.calibration.mismatch.inference.parameters.contradictions import (
+    contradictions,
+    is_told,
+    known_apart,
+    told_apart,
+)
+from regolithd.calibration.mismatch.inference.parameters.joint_parameters import joint_posterior, known_better_by_others
 from regolithd.calibration.mismatch.inference.several_channels import (
     merged_answers,
     no_surer_than_before,
@@ -26,8 +31,8 @@ from regolithd.calibration.mismatch.inference.several_channels import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.inference.contradictions import Apart
-    from regolithd.calibration.mismatch.inference.joint_parameters import JointPosterior
+    from regolithd.calibration.mismatch.inference.parameters.contradictions import Apart
+    from regolithd.calibration.mismatch.inference.parameters.joint_parameters import JointPosterior
     from regolithd.calibration.mismatch.result import Comparison
     from regolithd.calibration.mismatch.simulation.known_together import Known, KnownTogether
     from regolithd.calibration.mismatch.simulation.simulation import Simulation

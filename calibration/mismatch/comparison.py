@@ -40,24 +40,27 @@ from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.refuted import without_refuted_curves
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.beside_spells import named_beside_spells
-from regolithd.calibration.mismatch.inference.dynamics import notes_on_held_inputs
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
-from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, beside_regions, earned
-from regolithd.calibration.mismatch.inference.improbable import in_probable_regions, over_time_if_improbable
-from regolithd.calibration.mismatch.inference.initial_states import with_initial_states
-from regolithd.calibration.mismatch.inference.joint_parameters import information_of
-from regolithd.calibration.mismatch.inference.opposite_sign import notes_on_opposite_sign
-from regolithd.calibration.mismatch.inference.parameter_information import drawn_for
-from regolithd.calibration.mismatch.inference.same_parameters import with_changes_beside_same_parameters
-from regolithd.calibration.mismatch.inference.shown_direction import notes_on_shown_direction
+from regolithd.calibration.mismatch.inference.other_answers.improbable import (
+    in_probable_regions,
+    over_time_if_improbable,
+)
+from regolithd.calibration.mismatch.inference.parameters.initial_states import with_initial_states
+from regolithd.calibration.mismatch.inference.parameters.joint_parameters import information_of
+from regolithd.calibration.mismatch.inference.parameters.parameter_information import drawn_for
+from regolithd.calibration.mismatch.inference.parameters.same_parameters import with_changes_beside_same_parameters
+from regolithd.calibration.mismatch.inference.unexplained.dynamics import notes_on_held_inputs
+from regolithd.calibration.mismatch.inference.unexplained.feedback import fed_back, notes_of_feedback
+from regolithd.calibration.mismatch.inference.unexplained.opposite_sign import notes_on_opposite_sign
+from regolithd.calibration.mismatch.inference.unexplained.shown_direction import notes_on_shown_direction
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
-from regolithd.calibration.mismatch.regression.reliability import noise_size_of
+from regolithd.calibration.mismatch.regression.likelihood.reliability import noise_size_of
 from regolithd.calibration.mismatch.result import Comparison
-from regolithd.calibration.mismatch.selection.confined import without_confined_laws
+from regolithd.calibration.mismatch.selection.by_region.confined import without_confined_laws
 from regolithd.calibration.mismatch.selection.decision import as_if_late, decide
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.candidates.candidate import Shape
-    from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
-    from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
+    from regolithd.calibration.mismatch.problem.corrections.onset_clock import FoundIn
+    from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Answer, Effect, Evidence
     from regolithd.calibration.mismatch.contribution import Contribution
-    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]

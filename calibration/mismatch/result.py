@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Answer, Evidence
-    from regolithd.calibration.mismatch.inference.joint_parameters import Information
+    from regolithd.calibration.mismatch.inference.parameters.joint_parameters import Information
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 

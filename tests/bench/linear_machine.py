@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch import Candidate, Coefficient, Prior, Problem, Shape, Simulation, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
-from regolithd.calibration.mismatch.regression.candidate_groups import with_candidates
 from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix, empty_design
 from regolithd.calibration.mismatch.regression.group import Group, Term
+from regolithd.calibration.mismatch.regression.groups.candidate_groups import with_candidates
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
-from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:

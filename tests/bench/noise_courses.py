@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
+from regolithd.calibration.mismatch.signal.noise_models.local_size import of_usual_noise
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.step import Step
-from regolithd.calibration.mismatch.problem.principal_axes import switches
+from regolithd.calibration.mismatch.problem.tangents.principal_axes import switches
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.fitted_variant import at_fitted_value, over_fitted_value
+from regolithd.calibration.mismatch.problem.tangents.fitted_variant import at_fitted_value, over_fitted_value
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -15,9 +15,9 @@ from regolithd.calibration.mismatch.candidates.growth import (
     onset_grid,
     onset_range,
 )
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
+from regolithd.calibration.mismatch.signal.noise_models.noise import estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.signal.recursion import recursion
+from regolithd.calibration.mismatch.signal.noise_models.recursion import recursion
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Shape

@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAn
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.least_squares import fitted, squares_left
-from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
+from regolithd.calibration.mismatch.signal.noise_models.whitening import NOT_WHITENED, Whitening, estimate_whitening
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -9,9 +9,9 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.lag_scan import best_lag
 from regolithd.calibration.mismatch.problem.delayed import Restart, filtered, restart_of, shifted, smoothed
-from regolithd.calibration.mismatch.problem.fitted_variant import over_fitted_value
-from regolithd.calibration.mismatch.problem.limits import at_limit
-from regolithd.calibration.mismatch.signal.stretches import stretches
+from regolithd.calibration.mismatch.problem.readings.limits import at_limit
+from regolithd.calibration.mismatch.problem.tangents.fitted_variant import over_fitted_value
+from regolithd.calibration.mismatch.signal.intermittency.stretches import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

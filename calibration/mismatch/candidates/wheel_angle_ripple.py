@@ -12,9 +12,9 @@ from regolithd.calibration.mismatch.candidates.responses import Responses
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, columns_of
 from regolithd.calibration.mismatch.problem.covariates import angle_is_recorded
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
-from regolithd.calibration.mismatch.signal.means import running_mean
+from regolithd.calibration.mismatch.signal.intermittency.means import running_mean
+from regolithd.calibration.mismatch.signal.noise_models.spectrum import padded_length, power_of_sums
 from regolithd.calibration.mismatch.signal.phase import shifted_to
-from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -19,10 +19,10 @@ from regolithd.calibration.mismatch.empirical.suggestions import (
     standard_deviations,
 )
 from regolithd.calibration.mismatch.empirical.sums import points_beside, profile, squares_on_fold, sums_of
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
-from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, SINES
+from regolithd.calibration.mismatch.regression.groups.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import PERIODIC, SINES
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:

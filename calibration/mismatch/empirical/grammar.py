@@ -26,7 +26,7 @@ NARROWEST, WIDEST = 0.015, 3.0
 for a bump in the place of a narrow band, to what is all but a straight line)."""
 FEWEST_CYCLES, MOST_CYCLES = 0.5, 24.0
 """Cycles of a sine within the range (a choice: fewer are a parabola; more are not looked for, see
-`regression/smooth_groups.py`)."""
+`regression/groups/smooth_groups.py`)."""
 TRIED_A_CYCLE = 6
 """Points of the grid for each further cycle (a choice: what is found is refined)."""
 VALUES_A_CYCLE = 3

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.calibration.linearised import worse_than_stated
 from regolithd.calibration.mismatch.empirical.found import curves_of
-from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
-from regolithd.calibration.mismatch.inference.probability import decided_by_evidence
+from regolithd.calibration.mismatch.inference.other_answers.probability import decided_by_evidence
+from regolithd.calibration.mismatch.inference.unexplained.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.selection.decision import names_of
 
 if TYPE_CHECKING:

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.regression.smooth_groups import acting
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import acting
 from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels, long_run_weights
-from regolithd.calibration.mismatch.regression.smooth_groups import acting
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import acting
+from regolithd.calibration.mismatch.regression.likelihood.as_read import columns_on_wheels, long_run_weights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

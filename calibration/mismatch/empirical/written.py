@@ -9,14 +9,14 @@ import numpy as np
 
 from regolithd.calibration.mismatch.empirical.stated import name_of
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
+from regolithd.calibration.mismatch.regression.groups.lagged_groups import LAGGED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Answer, Evidence
     from regolithd.calibration.mismatch.contribution import Contribution
-    from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve, StatedCurve
 
 
 def with_curves(

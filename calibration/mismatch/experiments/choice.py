@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.experiments.margins import (
     worst,
 )
 from regolithd.calibration.mismatch.experiments.settings import Setting, predicts_row_by_row
-from regolithd.calibration.mismatch.regression.as_read import long_run_weights
+from regolithd.calibration.mismatch.regression.likelihood.as_read import long_run_weights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.experiments.settings import NOT_SET
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.residuals import relative_size
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.regression.screening.schur import pseudo_inverse
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

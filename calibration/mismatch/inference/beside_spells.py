@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.inference.held_out import (
     groups_to_choose_from,
     with_optimised_shapes,
 )
-from regolithd.calibration.mismatch.inference.intermittent import names_beside_spells, wheels_with_spells
+from regolithd.calibration.mismatch.inference.unexplained.intermittent import names_beside_spells, wheels_with_spells
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_of_whitened

@@ -12,11 +12,11 @@ from regolithd.calibration.mismatch.answer import Curve, EmpiricalFit, Evidence
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_change
 from regolithd.calibration.mismatch.contribution import Contribution
-from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
-from regolithd.calibration.mismatch.problem.onset_clock import found_here
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import StatedCurve
+from regolithd.calibration.mismatch.problem.corrections.onset_clock import found_here
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import has_smooth_term
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import has_smooth_term
 from regolithd.calibration.mismatch.signal.binning import binned_means, even_edges
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
-    from regolithd.calibration.mismatch.signal.noise import NoiseModel
+    from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

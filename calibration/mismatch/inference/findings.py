@@ -18,37 +18,37 @@ from regolithd.calibration.mismatch.answer import (
 )
 from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION
-from regolithd.calibration.mismatch.inference.alternatives import with_other_statements, with_refused
-from regolithd.calibration.mismatch.inference.dynamics import notes_on_dynamics
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
-from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
-from regolithd.calibration.mismatch.inference.intervals import (
-    law_stds_of,
-    parameters_of,
-    size_posteriors_of,
-)
-from regolithd.calibration.mismatch.inference.joint_parameters import information_of, joint_posterior
-from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
-from regolithd.calibration.mismatch.inference.other_covariates import (
+from regolithd.calibration.mismatch.inference.other_answers.alternatives import with_other_statements, with_refused
+from regolithd.calibration.mismatch.inference.other_answers.identifiability import indistinguishable
+from regolithd.calibration.mismatch.inference.other_answers.other_covariates import (
     notes_on_a_curve_in_place,
     notes_on_other_covariates,
     notes_on_ways_to_act,
 )
-from regolithd.calibration.mismatch.inference.own_values import far_enough, notes_on_own_values, own_values
-from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
-from regolithd.calibration.mismatch.inference.probability import (
+from regolithd.calibration.mismatch.inference.other_answers.probability import (
     decided_by_evidence,
     is_known,
     other_answers,
     probability,
 )
-from regolithd.calibration.mismatch.inference.ranges import notes_on_confined_laws, range_of
-from regolithd.calibration.mismatch.inference.same_parameters import with_changed_or_moved
-from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
+from regolithd.calibration.mismatch.inference.parameters.joint_parameters import information_of, joint_posterior
+from regolithd.calibration.mismatch.inference.parameters.own_values import far_enough, notes_on_own_values, own_values
+from regolithd.calibration.mismatch.inference.parameters.parameter_information import parameter_covariance
+from regolithd.calibration.mismatch.inference.parameters.same_parameters import with_changed_or_moved
 from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
-from regolithd.calibration.mismatch.regression.as_read import as_read
-from regolithd.calibration.mismatch.regression.lasting_errors import has_lasting_errors
+from regolithd.calibration.mismatch.inference.uncertainty.intervals import (
+    law_stds_of,
+    parameters_of,
+    size_posteriors_of,
+)
+from regolithd.calibration.mismatch.inference.uncertainty.sensitivity import sensitivities
+from regolithd.calibration.mismatch.inference.unexplained.dynamics import notes_on_dynamics
+from regolithd.calibration.mismatch.inference.unexplained.located import share_of_residual, spell_of
+from regolithd.calibration.mismatch.inference.unexplained.ranges import notes_on_confined_laws, range_of
+from regolithd.calibration.mismatch.regression.likelihood.as_read import as_read
+from regolithd.calibration.mismatch.regression.likelihood.lasting_errors import has_lasting_errors
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
@@ -57,12 +57,12 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Change, Indistinguishable, Verdict
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
-    from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
-    from regolithd.calibration.mismatch.inference.intervals import Drawn
+    from regolithd.calibration.mismatch.inference.other_answers.alternatives import Alternative
+    from regolithd.calibration.mismatch.inference.uncertainty.intervals import Drawn
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
-    from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.likelihood.as_read import AsRead
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]

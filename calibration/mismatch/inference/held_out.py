@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
-from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
-from regolithd.calibration.mismatch.inference.likelier_names import likelier_names
+from regolithd.calibration.mismatch.inference.other_answers.improbable import unexplained_if_improbable
+from regolithd.calibration.mismatch.inference.other_answers.likelier_names import likelier_names
+from regolithd.calibration.mismatch.inference.unexplained.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
 from regolithd.calibration.mismatch.selection.decision import names_of, without_name
-from regolithd.calibration.mismatch.selection.law_misfit import without_terms
+from regolithd.calibration.mismatch.selection.plausibility.law_misfit import without_terms
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, with_best_developments
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from math import prod
 from typing import TYPE_CHECKING, TypeVar
 
 from regolithd.calibration.mismatch.answer import Answer, OtherAnswer
-from regolithd.calibration.mismatch.inference.probability import TOLD
+from regolithd.calibration.mismatch.inference.other_answers.probability import TOLD
 from regolithd.calibration.mismatch.inference.statements import (
     notes_beside_priors,
     notes_on_priors,

@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.online.pieces import Piece
-    from regolithd.calibration.mismatch.signal.noise import NoiseModel
+    from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel, estimate_noise
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.online.sums import Interval

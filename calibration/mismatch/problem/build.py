@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
-from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
-from regolithd.calibration.mismatch.problem.input_doubt import bias_of, without_error_of_derivatives
-from regolithd.calibration.mismatch.problem.outliers import FaultyReadings, note_on_far_readings
+from regolithd.calibration.mismatch.problem.inputs.input_doubt import bias_of, without_error_of_derivatives
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
+from regolithd.calibration.mismatch.problem.readings.compared import blanks_of, left_out
+from regolithd.calibration.mismatch.problem.readings.outliers import FaultyReadings, note_on_far_readings
+from regolithd.calibration.mismatch.problem.readings.zero import note_on_zero, zero_is_arbitrary
 from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, put_on_time, simulated
 from regolithd.calibration.mismatch.problem.words import labels_of
-from regolithd.calibration.mismatch.problem.zero import note_on_zero, zero_is_arbitrary
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.signal.stretches import stretches
+from regolithd.calibration.mismatch.signal.intermittency.stretches import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.signal.recursion import recursion
+from regolithd.calibration.mismatch.signal.noise_models.recursion import recursion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

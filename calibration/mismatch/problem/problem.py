@@ -10,22 +10,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
-from regolithd.calibration.mismatch.problem.input_doubt import bias_of
+from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.inputs.input_doubt import bias_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
-from regolithd.calibration.mismatch.problem.principal_axes import tangents_where_it_switches
-from regolithd.calibration.mismatch.problem.recent_arrays import RecentArrays
-from regolithd.calibration.mismatch.problem.zero import zero_is_arbitrary
-from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+from regolithd.calibration.mismatch.problem.readings.zero import zero_is_arbitrary
+from regolithd.calibration.mismatch.problem.tangents.principal_axes import tangents_where_it_switches
+from regolithd.calibration.mismatch.problem.tangents.recent_arrays import RecentArrays
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel, estimate_noise
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt
+    from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
+    from regolithd.calibration.mismatch.problem.inputs.input_doubt import InputDoubt
     from regolithd.calibration.mismatch.problem.predictor import Predictor
-    from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 Array = NDArray[np.float64]
 Readings = tuple[NDArray[np.int64], tuple[slice, ...]]

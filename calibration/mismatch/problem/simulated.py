@@ -18,20 +18,20 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_between, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
-from regolithd.calibration.mismatch.problem.errors_in_variables import ExpectedInputs, smoothed_inputs
-from regolithd.calibration.mismatch.problem.exact_covariates import given_exact_covariates
-from regolithd.calibration.mismatch.problem.gaps import carried_over_gaps, inputs_otherwise_in_gaps
-from regolithd.calibration.mismatch.problem.input_doubt import (
+from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import ExpectedInputs, smoothed_inputs
+from regolithd.calibration.mismatch.problem.inputs.exact_covariates import given_exact_covariates
+from regolithd.calibration.mismatch.problem.inputs.input_doubt import (
     InputDoubt,
     bias_of,
     input_doubt,
     total_doubt,
     wheels_in_common,
 )
-from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
-from regolithd.calibration.mismatch.problem.input_units import notes_on_units
+from regolithd.calibration.mismatch.problem.inputs.input_faults import without_input_faults
+from regolithd.calibration.mismatch.problem.inputs.input_units import notes_on_units
+from regolithd.calibration.mismatch.problem.inputs.shown_errors import notes_on_errors, shown_errors
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
-from regolithd.calibration.mismatch.problem.shown_errors import notes_on_errors, shown_errors
+from regolithd.calibration.mismatch.problem.state.gaps import carried_over_gaps, inputs_otherwise_in_gaps
 from regolithd.calibration.mismatch.signal.robust import robust_std
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.candidates.candidate import NO_LOADS, OF_A_LOAD
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.inference.intervals import unit_of
+from regolithd.calibration.mismatch.inference.uncertainty.intervals import unit_of
 from regolithd.calibration.mismatch.problem.words import in_units, in_words
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
-    from regolithd.calibration.mismatch.signal.noise import NoiseModel
+    from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 
 Index = NDArray[np.int64]
 

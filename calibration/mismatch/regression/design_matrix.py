@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.column_file import ColumnFile
-from regolithd.calibration.mismatch.regression.sums import Sums
-from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening
+from regolithd.calibration.mismatch.regression.products.column_file import ColumnFile
+from regolithd.calibration.mismatch.regression.products.sums import Sums
+from regolithd.calibration.mismatch.signal.noise_models.whitening import NOT_WHITENED, Whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

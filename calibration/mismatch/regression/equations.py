@@ -8,17 +8,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
-from regolithd.calibration.mismatch.regression.candidate_groups import with_candidates
 from regolithd.calibration.mismatch.regression.design_matrix import empty_design
-from regolithd.calibration.mismatch.regression.lagged_groups import with_lagged_terms
+from regolithd.calibration.mismatch.regression.groups.candidate_groups import with_candidates
+from regolithd.calibration.mismatch.regression.groups.lagged_groups import with_lagged_terms
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.regression.groups.state_groups import with_state_terms
+from regolithd.calibration.mismatch.regression.likelihood.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
-from regolithd.calibration.mismatch.regression.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
-from regolithd.calibration.mismatch.regression.state_groups import with_state_terms
-from regolithd.calibration.mismatch.signal.noise import NoiseModel
-from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_models.whitening import NOT_WHITENED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape, Sharing
     from regolithd.calibration.mismatch.problem.problem import Problem
-    from regolithd.calibration.mismatch.regression.region import Region
+    from regolithd.calibration.mismatch.regression.groups.region import Region
 
 Array = NDArray[np.float64]
 

@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.asked import Asked
-from regolithd.calibration.mismatch.regression.batch import Left
-from regolithd.calibration.mismatch.regression.gains import Gains
 from regolithd.calibration.mismatch.regression.group import Fit, Term
-from regolithd.calibration.mismatch.regression.lasting_errors import (
+from regolithd.calibration.mismatch.regression.likelihood.lasting_errors import (
     covariance_of_scores,
     has_lasting_errors,
     moments_of_errors,
 )
 from regolithd.calibration.mismatch.regression.penalties import penalty
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
+from regolithd.calibration.mismatch.regression.screening.asked import Asked
+from regolithd.calibration.mismatch.regression.screening.batch import Left
+from regolithd.calibration.mismatch.regression.screening.gains import Gains
+from regolithd.calibration.mismatch.regression.screening.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.nuisance import Nuisance
-    from regolithd.calibration.mismatch.signal.whitening import Whitening
+    from regolithd.calibration.mismatch.signal.noise_models.whitening import Whitening
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]

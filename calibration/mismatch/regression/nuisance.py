@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
-from regolithd.calibration.mismatch.problem.initial_states import initial_states
 from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.problem.state.initial_states import initial_states
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.problem.initial_states import InitialState
     from regolithd.calibration.mismatch.problem.prior import Prior
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.problem.state.initial_states import InitialState
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.thresholds import Thresholds

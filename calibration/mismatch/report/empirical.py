@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from regolithd.calibration.mismatch.answer import EmpiricalFit, Evidence, Parameter, Suggestion, Unexplained
-    from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
     from regolithd.calibration.mismatch.report.axes import Array
     from regolithd.calibration.mismatch.report.labels import Labels
 

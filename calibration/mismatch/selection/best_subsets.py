@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import is_constant
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
-from regolithd.calibration.mismatch.regression.smooth_groups import is_constant
-from regolithd.calibration.mismatch.selection.causality import acts_forwards
-from regolithd.calibration.mismatch.selection.law_misfit import explained, explained_beside
+from regolithd.calibration.mismatch.selection.plausibility.causality import acts_forwards
+from regolithd.calibration.mismatch.selection.plausibility.law_misfit import explained, explained_beside
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.regression.gains import Gains
     from regolithd.calibration.mismatch.regression.group import Fit, Group, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.regression.screening.gains import Gains
 
 Scored = tuple[float, "Term"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
 from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of
-from regolithd.calibration.mismatch.selection.law_misfit import without_terms
+from regolithd.calibration.mismatch.selection.plausibility.law_misfit import without_terms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

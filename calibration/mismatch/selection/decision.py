@@ -18,10 +18,10 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import (
     on_some,
 )
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
-from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
+from regolithd.calibration.mismatch.regression.groups.candidate_groups import with_candidate
+from regolithd.calibration.mismatch.regression.groups.lagged_groups import LAGGED
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import with_periodic_terms
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
 from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_smooth_term,
     best_subsets,
@@ -29,14 +29,14 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
-from regolithd.calibration.mismatch.selection.implausible_effects import drop_what_the_implausible_explains
 from regolithd.calibration.mismatch.selection.noise_estimation import (
     noise_left,
     noise_of_whitened,
     whitened,
 )
-from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
-from regolithd.calibration.mismatch.selection.released_parameters import OtherStatement, released
+from regolithd.calibration.mismatch.selection.plausibility.implausible_effects import drop_what_the_implausible_explains
+from regolithd.calibration.mismatch.selection.plausibility.pulled_parameters import drop_what_pulls_parameters_out
+from regolithd.calibration.mismatch.selection.plausibility.released_parameters import OtherStatement, released
 from regolithd.calibration.mismatch.selection.shape_optimisation import with_best_developments
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
-    from regolithd.calibration.mismatch.signal.noise import NoiseModel
+    from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 
 Array = NDArray[np.float64]
 

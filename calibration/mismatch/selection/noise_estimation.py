@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
-from regolithd.calibration.mismatch.regression.reliability import reliability_of
+from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.regression.likelihood.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.selection.causality import acts_forwards
+from regolithd.calibration.mismatch.selection.plausibility.causality import acts_forwards
 from regolithd.calibration.mismatch.selection.slow_noise import score_beside_slow_noise
-from regolithd.calibration.mismatch.signal.noise import NoiseModel
-from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_models.whitening import estimate_whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
-from regolithd.calibration.mismatch.regression.candidate_groups import (
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.groups.candidate_groups import (
     coefficient_signs,
     cost_of_unusual_numbers,
     with_candidate,
 )
-from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import membership
-from regolithd.calibration.mismatch.regression.schur import delta_chi2_together, schur_complement
+from regolithd.calibration.mismatch.regression.screening.schur import delta_chi2_together, schur_complement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.group import Fit, Term
 from regolithd.calibration.mismatch.regression.normal_equations import membership
 from regolithd.calibration.mismatch.regression.penalties import full_penalty
-from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, schur_diagonal
+from regolithd.calibration.mismatch.regression.screening.schur import delta_chi2_of_each, schur_diagonal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
-from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.restricted_likelihood import FEWEST_READINGS, GivenColumns, Priors
+from regolithd.calibration.mismatch.regression.groups.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.regression.likelihood.as_read import columns_on_wheels
+from regolithd.calibration.mismatch.regression.likelihood.restricted_likelihood import (
+    FEWEST_READINGS,
+    GivenColumns,
+    Priors,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

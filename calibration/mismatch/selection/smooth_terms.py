@@ -10,16 +10,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import curves_over_time, same_covariate
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_smooth_term,
     chi2_quantile,
     wheels_of_faulty_sensors,
 )
-from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
-from regolithd.calibration.mismatch.selection.law_misfit import is_of_the_prediction, law_misfit, misfit_beside
+from regolithd.calibration.mismatch.selection.plausibility.changed_parameters import (
+    drop_what_a_changed_parameter_explains,
+)
+from regolithd.calibration.mismatch.selection.plausibility.law_misfit import (
+    is_of_the_prediction,
+    law_misfit,
+    misfit_beside,
+)
 from regolithd.calibration.mismatch.selection.slow_noise import (
     best_curve,
     lead_beside_slow_noise,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve, StatedCurve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,8 +8,8 @@ import numpy as np
 
 from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
-from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
+from regolithd.calibration.mismatch.problem.corrections.onset_clock import FoundIn
+from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

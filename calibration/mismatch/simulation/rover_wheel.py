@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from regolithd.calibration.drivetrain.torque import motor_current
 from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError, did_you_mean
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.prior import Prior, SensorError, own_name
 from regolithd.calibration.mismatch.simulation.open_circuit_voltage import open_circuit_voltage
 from regolithd.calibration.mismatch.simulation.simulation import Simulation

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.data.slow_channels import Between
-    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ class Simulation:
     `hold` or `blank`."""
     zero_means_nothing: ClassVar[bool | None] = None
     """Whether the zero of the predicted channel is arbitrary, so that effects are measured against how far it moves.
-    None: of a temperature, and of a voltage, pressure or length that is far from zero (`problem/zero.py`)."""
+    None: of a temperature, and of a voltage, pressure or length that is far from zero (`problem/readings/zero.py`)."""
     undefined_at_times: ClassVar[frozenset[str]] = frozenset()
     """Covariates whose NaN means that they do not apply (the slip of a wheel that stands), not that they are blank."""
     own_tables: ClassVar[tuple[str, ...]] = ()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch import Prior, Simulation
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.signal.recursion import recursion
+from regolithd.calibration.mismatch.signal.noise_models.recursion import recursion
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording

@@ -25,7 +25,7 @@ from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.validation.unnamed_effects.picture import draw
 from regolithd.calibration.validation.unnamed_effects.recordings import (

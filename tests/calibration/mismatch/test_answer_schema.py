@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch import answer as answers
 from regolithd.calibration.mismatch.answer import Answer, answer_schema
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import as_recording
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 
 if TYPE_CHECKING:

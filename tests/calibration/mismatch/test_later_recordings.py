@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.fleet.comparison import compare as compare_f
 from regolithd.calibration.mismatch.online.linearised import learned
 from regolithd.calibration.mismatch.online.pieces import Cutter, together
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.onset_clock import FoundIn, found_here
+from regolithd.calibration.mismatch.problem.corrections.onset_clock import FoundIn, found_here
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:

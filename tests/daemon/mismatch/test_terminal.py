@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.answer import (
 )
 from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetUnexplained
 from regolithd.calibration.mismatch.inference.statements import NO_HELP
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.daemon.mismatch.terminal import print_answer
 

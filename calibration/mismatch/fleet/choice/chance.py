@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.fleet.choice.equations import column_map
 from regolithd.calibration.mismatch.fleet.choice.search import course_cost, may_share, penalty, summed_over
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
-from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, schur_diagonal
+from regolithd.calibration.mismatch.regression.screening.schur import delta_chi2_of_each, schur_diagonal
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

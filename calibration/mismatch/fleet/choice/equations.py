@@ -15,7 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
-from regolithd.calibration.mismatch.regression.schur import held_by_last, pseudo_inverse, with_further_readings
+from regolithd.calibration.mismatch.regression.screening.schur import (
+    held_by_last,
+    pseudo_inverse,
+    with_further_readings,
+)
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

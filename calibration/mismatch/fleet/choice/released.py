@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
-from regolithd.calibration.mismatch.inference.joint_parameters import Information, joint_posterior
+from regolithd.calibration.mismatch.inference.parameters.joint_parameters import Information, joint_posterior
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

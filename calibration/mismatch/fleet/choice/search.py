@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course, courses_over
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
-from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, delta_chi2_together
+from regolithd.calibration.mismatch.regression.screening.schur import delta_chi2_of_each, delta_chi2_together
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:

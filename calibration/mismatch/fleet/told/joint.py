@@ -8,9 +8,9 @@ import numpy as np
 
 from regolithd.calibration.mismatch.fleet.told.answer import FleetParameter
 from regolithd.calibration.mismatch.fleet.told.findings import owners_of
-from regolithd.calibration.mismatch.inference.joint_parameters import Information, joint_posterior
-from regolithd.calibration.mismatch.inference.parameter_information import SINGULAR
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.inference.parameters.joint_parameters import Information, joint_posterior
+from regolithd.calibration.mismatch.inference.parameters.parameter_information import SINGULAR
+from regolithd.calibration.mismatch.regression.screening.schur import pseudo_inverse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,8 +10,8 @@ import numpy as np
 from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.fleet.choice.search import further, place_of, score
 from regolithd.calibration.mismatch.fleet.choice.selection import without
-from regolithd.calibration.mismatch.inference.experiment import as_it_runs
-from regolithd.calibration.mismatch.inference.identifiability import wrong_choice_rate
+from regolithd.calibration.mismatch.inference.other_answers.experiment import as_it_runs
+from regolithd.calibration.mismatch.inference.other_answers.identifiability import wrong_choice_rate
 from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS

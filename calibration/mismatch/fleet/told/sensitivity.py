@@ -9,7 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.answer import Sensitivity
 from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
-from regolithd.calibration.mismatch.inference.sensitivity import LARGEST_TOLD
+from regolithd.calibration.mismatch.inference.uncertainty.sensitivity import LARGEST_TOLD
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

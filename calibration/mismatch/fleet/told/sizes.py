@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
 from regolithd.calibration.mismatch.fleet.choice.selection import relative_size
-from regolithd.calibration.mismatch.inference.intervals import OF_SIGN, unit_of
+from regolithd.calibration.mismatch.inference.uncertainty.intervals import OF_SIGN, unit_of
 from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS

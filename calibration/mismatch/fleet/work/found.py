@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
 from regolithd.calibration.mismatch.inference.findings import noise_floor
-from regolithd.calibration.mismatch.inference.probability import leads_of
+from regolithd.calibration.mismatch.inference.other_answers.probability import leads_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.responses import strongest
-from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs
+from regolithd.calibration.mismatch.regression.groups.candidate_groups import coefficient_signs
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.regression.column_file import TemporaryColumns
+from regolithd.calibration.mismatch.regression.products.column_file import TemporaryColumns
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.fleet.work.found import Found

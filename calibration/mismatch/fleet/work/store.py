@@ -20,8 +20,8 @@ from regolithd.calibration.mismatch.candidates.responses import Responses
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
 from regolithd.calibration.mismatch.inference.findings import Findings
+from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
 from regolithd.calibration.mismatch.problem.problem import LeftOut
-from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -19,12 +19,12 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, col
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.initial_states import initial_states
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
+from regolithd.calibration.mismatch.problem.state.initial_states import initial_states
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
+from regolithd.calibration.mismatch.regression.groups.candidate_groups import implausibility
 from regolithd.calibration.mismatch.regression.nuisance import from_priors, tangents
-from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:

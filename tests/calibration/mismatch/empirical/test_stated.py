@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw, beyond_the_range, name_of
 from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve, StatedCurve
 from regolithd.calibration.mismatch.simulation.corrected_curves import entry_of, stated_curves
 
 CURVE = EmpiricalCurve(

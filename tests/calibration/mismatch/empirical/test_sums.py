@@ -9,8 +9,8 @@ import pytest
 from linear_machine import equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.empirical.sums import profile, squares_on_fold, sums_of
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.cross_validation import squares_on_fold as squares_of_readings
 from regolithd.calibration.mismatch.selection.cross_validation import training_equations

@@ -25,7 +25,7 @@ from regolithd.calibration.mismatch.experiments.margins import (
     predictable,
 )
 from regolithd.calibration.mismatch.experiments.settings import Setting, predicts_row_by_row, settings_of
-from regolithd.calibration.mismatch.inference.experiment import range_in_words, with_experiment
+from regolithd.calibration.mismatch.inference.other_answers.experiment import range_in_words, with_experiment
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.regression.group import Term

@@ -7,7 +7,7 @@ import pytest
 from law_problem import SPEED, P
 
 from regolithd.calibration.mismatch.inference.evidence import _curves_over
-from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 
 NOISE = NoiseModel(np.array([0.1, 0.2, 0.3, 0.4]), 5.0)
 

@@ -26,7 +26,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     what_it_follows,
     words_of,
 )
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Shape

@@ -8,10 +8,10 @@ import numpy as np
 
 from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.problem.autoregressive_truths import normal_truths
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.inputs.autoregressive_truths import normal_truths
+from regolithd.calibration.mismatch.problem.inputs.true_values import NoisyColumn, smooth_where_better, still_at_rest
 from regolithd.calibration.mismatch.problem.simulated import inputs_of, simulated
-from regolithd.calibration.mismatch.problem.true_values import NoisyColumn, smooth_where_better, still_at_rest
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

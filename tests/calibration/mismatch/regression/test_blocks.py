@@ -7,7 +7,7 @@ import pytest
 from linear_machine import INSTANTS, STEP_S, problem_of, table
 
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
-from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
 LENGTH_S = (INSTANTS - 1) * STEP_S

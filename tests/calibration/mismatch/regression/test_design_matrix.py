@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from linear_machine import AXES, INSTANTS, design_of, problem_of, table
 
-from regolithd.calibration.mismatch.regression import sums
-from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening
+from regolithd.calibration.mismatch.regression.products import sums
+from regolithd.calibration.mismatch.signal.noise_models.whitening import NOT_WHITENED, Whitening
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix

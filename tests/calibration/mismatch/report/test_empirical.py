@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.answer import EmpiricalFit, Parameter, Suggestion, Unexplained
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve, StatedCurve
 from regolithd.calibration.mismatch.report.empirical import empirical_section
 from regolithd.calibration.mismatch.report.labels import Labels
 

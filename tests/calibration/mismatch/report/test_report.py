@@ -27,7 +27,7 @@ from regolithd.calibration.mismatch.answer import (
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
 from regolithd.calibration.mismatch.inference.statements import plural, statement
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence

@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch import Prior
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.group import Term
-from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,

@@ -10,7 +10,7 @@ from linear_machine import NOISE, equations_of, problem_of, table
 from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
+from regolithd.calibration.mismatch.signal.noise_models.noise import estimate_noise
 
 
 def test_an_effect_does_not_count_as_noise() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from linear_machine import equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.regression.nuisance import Nuisance
-from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection import smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.slow_noise import best_curve

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
-from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
+from regolithd.calibration.mismatch.problem.corrections.onset_clock import FoundIn
+from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
 
 EFFECT: dict[str, Any] = {"name": "viscous-friction", "shape": {}, "coefficients": [1], "wheels": [1, "left"]}

@@ -17,7 +17,7 @@ from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.fleet.work.sums import Sums, sums_of
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.covariates import direction_of
-from regolithd.calibration.mismatch.problem.initial_states import initial_states
+from regolithd.calibration.mismatch.problem.state.initial_states import initial_states
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

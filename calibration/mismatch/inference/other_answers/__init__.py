@@ -1,0 +1,1 @@
+"""Other answers to the same recording: which, how probable, and the experiment that tells them apart."""

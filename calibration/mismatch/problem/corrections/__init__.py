@@ -1,0 +1,1 @@
+"""What a corrected simulation brings with it: curves, onsets, and sizes with their uncertainty."""

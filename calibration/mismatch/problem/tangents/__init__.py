@@ -1,0 +1,1 @@
+"""Changes of the prediction with parameters and variants."""

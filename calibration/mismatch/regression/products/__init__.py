@@ -1,0 +1,1 @@
+"""Columns in a file, and their sums of products."""

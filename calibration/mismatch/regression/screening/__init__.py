@@ -1,0 +1,1 @@
+"""What groups would gain beside a fit, many at once."""

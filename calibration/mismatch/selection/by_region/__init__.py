@@ -1,0 +1,1 @@
+"""Laws that hold or fail in a range of a covariate alone."""

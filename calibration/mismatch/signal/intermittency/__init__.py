@@ -1,0 +1,1 @@
+"""What comes and goes in a course of readings."""

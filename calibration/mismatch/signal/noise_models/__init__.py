@@ -1,0 +1,1 @@
+"""Models of noise: size, autocorrelation and spectrum."""
