@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS
-from regolithd.calibration.mismatch.candidates.reversal import reversal_of
-from regolithd.calibration.mismatch.candidates.sensor_delay import (
+from regolithd.calibration.mismatch.candidates.late_columns import (
     columns_of,
     late_inputs,
     late_inputs_on,
@@ -24,6 +22,8 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import (
     makes_late,
     on_some,
 )
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.search import Search
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown, moved_input
+from regolithd.calibration.mismatch.candidates.late_columns import SENSOR_DELAY, as_shown
+from regolithd.calibration.mismatch.candidates.sensor_delay import moved_input
 from regolithd.calibration.mismatch.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class _LateSearch(Search):
     @cached_property
     def added_by_others(self) -> Array:
         """What corrected effects other than delays add on the output, shape (time, wheel)."""
-        others = tuple(effect for effect in self.problem.stated if effect.name != SensorDelay.name)
+        others = tuple(effect for effect in self.problem.stated if effect.name != SENSOR_DELAY)
         return replace(self.problem, stated=others).added
 
     def _on_time(self, values: Mapping[str, float], inputs: Mapping[str, float]) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.calibration.step import Step, power
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown
 from regolithd.calibration.mismatch.inference.statements import after_number
 from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
 from regolithd.calibration.mismatch.regression.nuisance import stated_names

@@ -15,8 +15,8 @@ from regolithd.calibration.mismatch.candidates.friction_laws import (
     decaying_drag,
     friction_laws,
 )
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown
 from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, displacement_of
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
 from regolithd.calibration.mismatch.signal.chi_squared import quantile

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown, columns_of
 from regolithd.calibration.mismatch.candidates.responses import Responses
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, columns_of
 from regolithd.calibration.mismatch.problem.covariates import angle_is_recorded
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.intermittency.means import running_mean

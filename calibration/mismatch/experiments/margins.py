@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.experiments.settings import NOT_SET
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.residuals import relative_size

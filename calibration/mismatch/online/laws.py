@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.problem.words import in_units
 
 if TYPE_CHECKING:

@@ -97,7 +97,7 @@ class Problem:
     on_time_on: the wheels on which they are, by their indices, of those that are late on some
     as_recorded: where some are, the prediction from the inputs as they were recorded, without stated effects; None:
         `prediction` is of these
-    late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
+    late: how the predicted channel is late, by `late_columns.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     late_on: the wheels, by their indices, on which it is late; empty: on all
     fed_back: covariates that follow the channel's noise: no curve over them explains anything

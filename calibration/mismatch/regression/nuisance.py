@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown
 from regolithd.calibration.mismatch.problem.prior import own_name
 from regolithd.calibration.mismatch.problem.state.initial_states import initial_states
 

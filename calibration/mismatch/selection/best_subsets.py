@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.candidates.late_columns import SENSOR_DELAY
 from regolithd.calibration.mismatch.regression.groups.smooth_groups import is_constant
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.plausibility.causality import acts_forwards
@@ -102,7 +102,7 @@ def large_enough(equations: NormalEquations, fit: Fit, index: int) -> bool:
     """Return whether an effect is a finding by its size; a smaller delay is one if it is as clear as a curve is."""
     limits, term = equations.thresholds, fit.terms[index]
     size = relative_size(equations, fit, index)
-    if size >= limits.smallest_effect or term.name != SensorDelay.name:
+    if size >= limits.smallest_effect or term.name != SENSOR_DELAY:
         return size >= limits.smallest_effect
     gained = equations.score(fit) - equations.score(equations.fit(fit.without(index)))
     return size >= limits.smallest_delay_effect and gained > limits.smooth_term_entry

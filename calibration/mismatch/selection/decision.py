@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import (
+from regolithd.calibration.mismatch.candidates.late_columns import (
     KINDS,
-    SensorDelay,
+    SENSOR_DELAY,
     late_inputs,
     late_inputs_on,
     lateness,
@@ -161,7 +161,7 @@ class Decision:
 
     def _shape_now(self, index: int, term: Term) -> Shape:
         """Return the shape of a named term; of a corrected delay that has changed, with the delay that it has now."""
-        if not (term.group.is_change and term.name == SensorDelay.name):
+        if not (term.group.is_change and term.name == SENSOR_DELAY):
             return term.group.shape
         scale = float(self.equations.design.scale[term.group.columns[0]])
         times = 1 + float(self.named.coefficients[self.named.of_term(index)][0]) / scale
@@ -194,7 +194,7 @@ class Decision:
     @property
     def is_late_alone(self) -> bool:
         """Whether the predicted channel is late, and nothing else was found but late inputs."""
-        return self.late is not None and all(term.name == SensorDelay.name for term in self.whole.terms)
+        return self.late is not None and all(term.name == SENSOR_DELAY for term in self.whole.terms)
 
     @property
     def has_delay(self) -> bool:
@@ -275,7 +275,7 @@ def as_if_late(decision: Decision) -> Decision | None:
     Where the simulation is linearised beside the delay, it has.
     """
     equations = decision.equations
-    delays = [group for group in equations.design.groups if group.named and group.name == SensorDelay.name]
+    delays = [group for group in equations.design.groups if group.named and group.name == SENSOR_DELAY]
     if decision.has_delay or not delays or not any(term.name in LAGGED for term in decision.unnamed):
         return None
     best = equations.gains(decision.named.terms, delays).largest_score()

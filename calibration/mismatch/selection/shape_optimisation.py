@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.groups.candidate_groups import (
     coefficient_signs,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.candidates.late_columns import SENSOR_DELAY
 from regolithd.calibration.mismatch.fleet.choice.search import MOST_TERMS, TRIED, further, score
 from regolithd.calibration.mismatch.regression.residuals import active_size
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
@@ -107,12 +107,12 @@ class Chooser:
         equations, last = self.equations, more.terms[-1]
         here = np.isin(equations.rover, last.units.rovers).astype(np.float64)
         with_it, told = (equations.fit(fit.terms, here) for fit in (more, less))
-        holds_all = last.name == SensorDelay.name or last.group.candidate.imitated_over == "torque"
+        holds_all = last.name == SENSOR_DELAY or last.group.candidate.imitated_over == "torque"
         beside = 0.0
         for index, term in enumerate(less.terms):
             if set(term.units.rovers) & set(last.units.rovers):
                 explained = told.delta_chi2 - equations.fit(without(less, index), here).delta_chi2
-                if term.name == SensorDelay.name and not holds_all:
+                if term.name == SENSOR_DELAY and not holds_all:
                     explained = min(explained, equations.held_by_last(told, index, with_it, here))
                 beside += explained
         return with_it.delta_chi2 - told.delta_chi2 > FURTHER_SHARE * beside

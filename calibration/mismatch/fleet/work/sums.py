@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown, columns_of
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.reversal import keep_reversal
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, columns_of
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem

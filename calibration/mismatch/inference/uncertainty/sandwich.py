@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.regression.groups.discrepancy_basis import discrepancy_basis
 from regolithd.calibration.mismatch.regression.likelihood.as_read import columns_on_wheels
 from regolithd.calibration.mismatch.regression.likelihood.lasting_errors import covariance_of_scores, moments_of_errors

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import late_with
+from regolithd.calibration.mismatch.candidates.late_columns import late_with
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, bridged
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown, bridged
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.regression.groups.smooth_groups import SINES
 from regolithd.calibration.mismatch.regression.groups.state_groups import ON_STATE

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown
 from regolithd.calibration.mismatch.candidates.motion import along_motion
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.problem.covariates import names_of_prediction
 from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.regression.group import Group

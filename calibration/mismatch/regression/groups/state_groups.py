@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import bridged
+from regolithd.calibration.mismatch.candidates.late_columns import bridged
 from regolithd.calibration.mismatch.problem.state.state_memory import memory_s, through_state
 from regolithd.calibration.mismatch.regression.groups.smooth_groups import (
     couplings_of,

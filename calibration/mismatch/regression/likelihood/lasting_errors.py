@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem

@@ -14,7 +14,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.growth import growth
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.candidates.late_columns import SENSOR_DELAY
 from regolithd.calibration.mismatch.problem.covariates import names_of_prediction
 from regolithd.calibration.mismatch.regression.groups.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
@@ -58,7 +58,7 @@ def explained_beside(equations: NormalEquations, names: Fit, further: Sequence[T
     partly = [
         index
         for index, term in enumerate(names.terms)
-        if term.name == SensorDelay.name or (of_laws and term.imitated_over not in over)
+        if term.name == SENSOR_DELAY or (of_laws and term.imitated_over not in over)
     ]
     if not partly:
         return explained(equations, names)

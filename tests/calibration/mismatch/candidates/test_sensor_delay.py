@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown
+from regolithd.calibration.mismatch.candidates.late_columns import as_shown
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.delayed import filtered, shifted, smoothed

@@ -12,8 +12,8 @@ import pytest
 from scipy.stats import chi2
 
 from regolithd.calibration.mismatch import Simulation
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.candidates.responses import strongest
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import FORMS, WheelAngleRipple
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem

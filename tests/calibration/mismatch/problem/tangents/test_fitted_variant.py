@@ -17,7 +17,7 @@ from regolithd.calibration.mismatch import (
     compare,
     from_columns,
 )
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
+from regolithd.calibration.mismatch.candidates.late_columns import columns_of
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.tangents.fitted_variant import VARIANT_VALUE
 
