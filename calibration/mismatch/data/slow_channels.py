@@ -59,10 +59,9 @@ def filled_between(recording: Recording, predicted: str, between: Mapping[str, B
 def drawn_between(recording: Recording, filled: Recording, name: str, how: Between) -> tuple[Array, Index]:
     """Return a filled column (time, wheel) as it may have been between its readings, and the row of the last reading.
 
-    In each gap it is off by one standard deviation, up or down by lot. About a straight line that is what a Brownian
-    motion is off between two of its readings: it has 2 u (1 − u) times the variance of a reading about the line between
-    its neighbours, at a share u of the gap. What is held has changed to the next reading with the probability u, if it
-    is asked for: where each reading differs from the one before, it is reported when it changes.
+    In each gap it is off by one standard deviation, up or down by lot; about a straight line by `off_line`. What is
+    held has changed to the next reading with the probability u, at a share u of the gap, if it is asked for: where each
+    reading differs from the one before, it is reported when it changes.
     """
     before, found = recording.channels[name], filled.channels[name].copy()
     last, random = np.repeat(np.arange(len(before))[:, None], before.shape[1], axis=1), np.random.default_rng(0)
@@ -71,7 +70,6 @@ def drawn_between(recording: Recording, filled: Recording, name: str, how: Betwe
         if known.size == column.size or known.size < FEWEST:
             continue
         steps = np.diff(column[known])
-        about = np.pad(np.diff(steps) / 2, 1) ** 2
         lot = random.choice([-1.0, 1.0], size=len(steps))
         asked = np.mean(np.abs(steps) <= MOST_NOISE * np.max(np.abs(steps))) > OFTEN_THE_SAME
         for gap in np.flatnonzero((np.diff(known) > 1) & np.isfinite(found[known[:-1] + 1, wheel])):
@@ -80,10 +78,20 @@ def drawn_between(recording: Recording, filled: Recording, name: str, how: Betwe
             if how == "hold":
                 off = np.sqrt(share) * steps[gap] * asked
             else:
-                off = lot[gap] * np.sqrt(share * (1 - share) * (about[gap] + about[gap + 1]))
+                off = lot[gap] * off_line(column[known], share[:, None])[:, gap]
             found[first + 1 : after, wheel] += off
             last[first + 1 : after, wheel] = first
     return found, last
+
+
+def off_line(readings: Array, share: Array | float) -> Array:
+    """Return how far a column may be from a straight line between two readings, at a share of the way, (…, gap).
+
+    A Brownian motion is off, between two of its readings, by 2 u (1 − u) times the variance of a reading about the line
+    between its neighbours, at a share u of the gap.
+    """
+    about = np.pad(np.diff(readings, 2) / 2, 1) ** 2
+    return np.asarray(np.sqrt(share * (1 - share) * (about[:-1] + about[1:])))
 
 
 def rows_held(recording: Recording, name: str) -> int:

@@ -59,7 +59,8 @@ def build_problem(
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
     inputs = inputs or inputs_of(recording, simulation, thresholds)
     all_values = {**simulation.variants(), **chosen}
-    run = simulated(put_on_time(inputs, late, late_on or {}) if late else inputs, simulation, all_values, thresholds)
+    on_time = put_on_time(inputs, simulation, all_values, late, late_on or {}) if late else inputs
+    run = simulated(on_time, simulation, all_values, thresholds)
     as_recorded = None
     if late:
         as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values) + bias_of(inputs.doubt)
@@ -113,7 +114,7 @@ def build_problem(
         row=simulation.row(recording.wheels),
         left_out=not_compared,
         thresholds=thresholds,
-        doubt=inputs.doubt,
+        doubt=on_time.doubt,
         on_time=dict(late or {}),
         on_time_on=dict(late_on or {}),
         as_recorded=as_recorded,

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_between, filled_between
+from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
+from regolithd.calibration.mismatch.problem.inputs.between_readings import doubt_by_slower, doubts_by_moved
 from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import ExpectedInputs, smoothed_inputs
 from regolithd.calibration.mismatch.problem.inputs.exact_covariates import given_exact_covariates
 from regolithd.calibration.mismatch.problem.inputs.input_doubt import (
@@ -25,7 +26,6 @@ from regolithd.calibration.mismatch.problem.inputs.input_doubt import (
     bias_of,
     input_doubt,
     total_doubt,
-    wheels_in_common,
 )
 from regolithd.calibration.mismatch.problem.inputs.input_faults import without_input_faults
 from regolithd.calibration.mismatch.problem.inputs.input_units import notes_on_units
@@ -164,7 +164,7 @@ def inputs_of(
         made_otherwise = smoothed_inputs(other_way, errors, normal)
         otherwise = given_exact_covariates(other_way, made_otherwise, errors, exact_beside(made))
     predicted = cache(lambda: predict(as_read))
-    between = _between_readings(recording, simulation, values, predicted)
+    between = doubt_by_slower(recording, simulation, lambda filled: predict(_derived(filled, simulation)[0]), predicted)
     by_errors = input_doubt(as_read, expected, simulation, values, errors, made.smoothers)
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
@@ -194,10 +194,17 @@ def _carries_over_gaps(
     return bool(carried_over_gaps(recording, np.isfinite(predicted()) & (moved != predicted())).any())
 
 
-def put_on_time(inputs: Inputs, late: Mapping[str, float], on: Mapping[str, tuple[int, ...]]) -> Inputs:
+def put_on_time(
+    inputs: Inputs,
+    simulation: Predictor,
+    values: Mapping[str, float],
+    late: Mapping[str, float],
+    on: Mapping[str, tuple[int, ...]],
+) -> Inputs:
     """Return the inputs with some of their columns as they would have been recorded without their delay [s].
 
     What they were at the end of each run was not recorded any more. `on` has the wheels of those that are late on some.
+    The simulation with these `values` tells what is uncertain between two readings.
     """
 
     def moved(recording: Recording) -> Recording:
@@ -214,12 +221,14 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float], on: Mapping[str, tupl
     }
     for name, delay in late.items():
         blanks[name] = blanks.get(name, False) | beyond_the_end(inputs.expected, delay, on.get(name, ()))
+    expected = moved(inputs.expected)
     return replace(
         inputs,
         as_read=moved(inputs.as_read),
-        expected=moved(inputs.expected),
+        expected=expected,
         bridged_otherwise=otherwise,
         blanks=blanks,
+        doubt=total_doubt((inputs.doubt, *doubts_by_moved(expected, simulation, values, late, on))),
         otherwise_in_gaps=in_gaps,
     )
 
@@ -283,38 +292,6 @@ def _derived(filled: Recording, simulation: Predictor, *, other_way: bool = Fals
         raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
     derived, more = bridged(derived, simulation.inputs, between, other_way=other_way)
     return derived, {**more, **recorded}
-
-
-@dataclass(frozen=True, eq=False)
-class _BetweenReadings:
-    """What a slower column makes uncertain of the prediction: all of it, and its size since the column was read."""
-
-    doubt: InputDoubt
-    within: Array
-
-
-def _between_readings(
-    recording: Recording, simulation: Predictor, values: Mapping[str, float], predicted: Callable[[], Array]
-) -> dict[str, _BetweenReadings]:
-    """Return how uncertain the prediction is by each slower column that it depends on, between its readings.
-
-    `predicted` returns the prediction from the readings as they are.
-    """
-    filled = filled_between(recording, simulation.channel, simulation.between_readings)
-    slower = [name for name, column in filled.channels.items() if column is not recording.channels[name]]
-    before = predicted() if slower else np.zeros(0)
-    found = {}
-    for name in slower:
-        drawn, last = drawn_between(recording, filled, name, simulation.between_readings.get(name, "linear"))
-        other, _ = _derived(filled.with_channels(**{name: drawn}), simulation)
-        off = np.nan_to_num(simulation.predict(complete_inputs(other), values) - before)
-        if off.any():
-            rows = np.stack([np.bincount(of_wheel)[of_wheel] for of_wheel in last.T], axis=1)
-            doubt = InputDoubt(
-                off**2, off**2 * rows * wheels_in_common(drawn), np.zeros(off.shape), np.zeros((0, *off.shape))
-            )
-            found[name] = _BetweenReadings(doubt, np.abs(off - np.take_along_axis(off, last, axis=0)))
-    return found
 
 
 def _inputs_of_speed(recording: Recording, simulation: Predictor) -> frozenset[str]:

@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.signal.noise_models.noise import NoiseModel
 from regolithd.calibration.mismatch.signal.noise_models.whitening import estimate_whitening
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Fit, Term
@@ -40,9 +40,7 @@ def fit_of_significant_terms(equations: NormalEquations) -> Fit:
     second = _noise_beside(provisional, _most_significant(provisional, limits.provisional_terms, -np.inf))
     # Of all wheels together: an effect that is still in one wheel's residual would hide in that wheel's own time.
     weighted = equations.weighted(NoiseModel(second.deviation, second.autocorrelation_time).weights)
-    least_score = limits.noise_term_share * limits.smooth_term_entry
-    terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
-    return weighted.fit(_beyond_slow_noise(weighted, terms))
+    return weighted.fit(_beyond_slow_noise(weighted))
 
 
 def noise_left(equations: NormalEquations) -> Array:
@@ -56,23 +54,32 @@ def noise_left(equations: NormalEquations) -> Array:
     return _about_its_mean(free, residual_of(free, free.fit(terms)))
 
 
-def _beyond_slow_noise(equations: NormalEquations, terms: Sequence[Term]) -> list[Term]:
-    """Return the terms without which the residual is less likely to be noise, whatever the spectrum of that is.
+def _beyond_slow_noise(equations: NormalEquations) -> list[Term]:
+    """Return the terms that are significant, and without which what is left is less likely noise of any spectrum.
 
     Under a short autocorrelation time slow noise is significant, and a curve that follows it would be taken out of it.
-    The worst term is left out first.
+    The worst term is left out first, and others are asked in its place: of a law that changes slowly, a curve over time
+    explains more with many coefficients, and in slow noise the law itself more with one.
     """
-    kept = list(terms)
-    while kept:
-        scores = [
-            score_beside_slow_noise(equations, [*kept[:index], *kept[index + 1 :]], [term])
-            for index, term in enumerate(kept)
-        ]
-        worst = int(np.argmin(scores))
-        if scores[worst] > 0:
-            break
-        del kept[worst]
-    return kept
+    limits = equations.thresholds
+    refused: set[str] = set()
+    kept: list[Term] = []
+    least_score = limits.noise_term_share * limits.smooth_term_entry
+    while True:
+        more = _most_significant(equations, 2 * limits.provisional_terms, least_score, kept, refused)
+        if len(more) == len(kept):
+            return kept
+        kept = more
+        while kept:
+            scores = [
+                score_beside_slow_noise(equations, [*kept[:index], *kept[index + 1 :]], [term])
+                for index, term in enumerate(kept)
+            ]
+            worst = int(np.argmin(scores))
+            if scores[worst] > 0:
+                break
+            refused.add(kept[worst].name)
+            del kept[worst]
 
 
 def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
@@ -105,15 +112,23 @@ def _about_its_mean(equations: NormalEquations, residual: Array) -> Array:
     return residual - np.where(mask, known_mean(np.where(mask, residual, np.nan)), 0.0)
 
 
-def _most_significant(equations: NormalEquations, most: int, least_score: float) -> list[Term]:
+def _most_significant(
+    equations: NormalEquations,
+    most: int,
+    least_score: float,
+    begin: Sequence[Term] = (),
+    without: Collection[str] = (),
+) -> list[Term]:
     """Return up to `most` terms by forward selection, as long as each scores more than `least_score`.
 
-    Smooth terms with many columns are left out: they follow the noise itself.
+    `begin` are those that are there already, `without` are names and covariates that are not asked. Smooth terms with
+    many columns are left out: they follow the noise itself.
     """
+    columns = equations.thresholds.noise_term_columns
     limited = [
-        group for group in equations.design.groups if len(group.columns) <= equations.thresholds.noise_term_columns
+        group for group in equations.design.groups if len(group.columns) <= columns and group.name not in without
     ]
-    terms: list[Term] = []
+    terms = list(begin)
     while len(terms) < most:
         found = equations.gains(terms, limited).largest_score()
         if found is None or found[0] <= least_score:

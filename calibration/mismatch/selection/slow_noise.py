@@ -44,7 +44,9 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
     if max((len(places) for places in read), default=0) < FEWEST_READINGS:
         return equations.score(equations.fit((*rest, *terms))) - equations.score(equations.fit(rest))
     given = equations.lately(_given, rest)
-    own = columns_on_wheels(equations, equations.columns_of(terms)[len(equations.nuisance.columns) :])
+    own = _weighed(
+        equations, columns_on_wheels(equations, equations.columns_of(terms)[len(equations.nuisance.columns) :])
+    )
     further = given.with_further([own[:, wheel, places] for wheel, places in enumerate(read)])
     gain, penalty = further.gain(), sum(equations.penalty(term) for term in terms)
     if (roughness := _roughness(equations, terms)) is not None:
@@ -56,13 +58,20 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
 def _given(equations: NormalEquations, terms: Sequence[Term]) -> GivenColumns:
     """Return the free parameters and terms as what is fitted anyway to the readings of each wheel."""
     design, nuisance = equations.design, equations.nuisance
-    columns, residual = columns_on_wheels(equations, equations.columns_of(terms)), design.residual_as_read
+    columns = _weighed(equations, columns_on_wheels(equations, equations.columns_of(terms)))
+    residual = _weighed(equations, design.residual_as_read.astype(np.float64))
     return GivenColumns(
-        [residual[wheel, places].astype(np.float64) for wheel, (places, _) in enumerate(design.readings)],
+        [residual[wheel, places] for wheel, (places, _) in enumerate(design.readings)],
         [columns[:, wheel, places] for wheel, (places, _) in enumerate(design.readings)],
         Priors(nuisance.precision, nuisance.centre),
         equations.thresholds,
     )
+
+
+def _weighed(equations: NormalEquations, series: Array) -> Array:
+    """Return series (…, wheel, time by folds) multiplied by what makes readings scatter alike."""
+    reliability = equations.design.reliability
+    return series if reliability is None else series * reliability
 
 
 def _roughness(equations: NormalEquations, terms: Sequence[Term]) -> Array | None:

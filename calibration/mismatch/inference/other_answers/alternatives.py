@@ -286,12 +286,12 @@ def _evidence(decision: Decision, fit: Fit) -> float:
 def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
     """Yield the sets of terms with one less, one more, or one in another's place; of the names alone, too.
 
-    A curve may hold what the wrong name beside it leaves: the right name needs none. And one curve may be what several
-    names imitate, or a name and another curve, or two names.
+    A curve may hold what the wrong name beside it leaves: the right name needs none. And one curve, or one other name,
+    may be what several names imitate, or a name and another curve, or two names.
     """
     terms, named = decision.whole.terms, tuple(term for term in decision.whole.terms if term.group.named)
     if len(named) > 1:
-        yield from ((curve,) for _, curve in best_of_each_smooth_term(decision.equations, ())[:1])
+        yield from ((other,) for other in _further(decision, ()))
     for index in range(len(named)) if len(named) < len(terms) else ():
         rest = (*named[:index], *named[index + 1 :])
         yield from ((*rest, other) for other in _further(decision, rest))
