@@ -130,18 +130,19 @@ def fitted(value: int, bits: int, *, signed: bool) -> int | None:
 
 
 def real(text: str, bits: int) -> float | None:
-    """Return a floating-point number, also where its bits are given in hexadecimal; None for another text."""
+    """Return a floating-point number, also of bits in hexadecimal; None for another text, or one that is too large."""
+    code = {32: ("<I", "<f"), 64: ("<Q", "<d")}[bits]
     if text.lower().startswith("0x"):
         raw = integer(text)
         if raw is None or raw >> bits:
             return None
-        code = {32: ("<I", "<f"), 64: ("<Q", "<d")}[bits]
         found: float = struct.unpack(code[1], struct.pack(code[0], raw))[0]
         return found
     try:
-        return float(text)
-    except ValueError:
+        struct.pack(code[1], found := float(text))
+    except (ValueError, OverflowError):
         return None
+    return found
 
 
 def _printable(line: str) -> str:

@@ -7,6 +7,7 @@ is still under way cannot restart them.
 from __future__ import annotations
 
 import asyncio
+import math
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.errors import BusError, DriveError, DriverError
@@ -123,7 +124,8 @@ def _check_limits(speeds: Sequence[tuple[Drive, float]]) -> None:
         fastest = max(abs(speed) for _, speed in speeds)
         allowed = f"more than object 0x607F allows ({', '.join(limited)} rad/s)"
         what = f"the motors would have to turn at {fastest:.1f} rad/s, {allowed}"
-        raise DriveError(what, remedy="Choose a lower speed")
+        share = min(drive.speed_limit_rad_s for drive, _ in speeds) / fastest
+        raise DriveError(what, remedy=f"Choose at most {math.floor(100 * share)} % of this speed")
 
 
 def _drive_error(failures: Sequence[DriverError]) -> DriveError:

@@ -93,6 +93,7 @@ def test_a_default_is_read_as_makers_write_it(default: str, data_type: str, valu
         ("$NODEID*2+0x180", "0x0007", "", "[6007] DefaultValue = $NODEID*2+0x180: is no number, nor $NODEID+number"),
         ("089", "0x0007", "", "[6007] DefaultValue = 089: is no number"),
         ("1,5", "0x0008", "", "[6007] DefaultValue = 1,5: is no REAL32"),
+        ("1e99", "0x0008", "", "[6007] DefaultValue = 1e99: is no REAL32"),
         ("0", "3h", "", "[6007] DataType = 3h: is no number"),
         ("0", "", "", "[6007] DataType = : is missing"),
         ("0", "3", "PDOMapping=true\n", "[6007] PDOMapping = true: is no number"),

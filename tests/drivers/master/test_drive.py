@@ -236,7 +236,7 @@ async def test_a_speed_that_a_drive_does_not_reach_is_refused_before_anything_is
     await rover.motion.enable()
     await rover.motion.set_speed((rad_s(9000) / 100, rad_s(-600) / 100))
     assert len(rover.bus.frames) == 2
-    too_fast = r"turn at 94\.2 rad/s, more than object 0x607F allows \(node 2 62\.8 rad/s\)\. Choose a lower speed$"
+    too_fast = r"turn at 94\.2 rad/s, more than object 0x607F allows \(node 2 62\.8 rad/s\)\. Choose at most 66 % of"
     with pytest.raises(DriveError, match=too_fast):
         await rover.motion.set_speed((rad_s(900) / 100, rad_s(-900) / 100))
     assert len(rover.bus.frames) == 2
