@@ -19,13 +19,15 @@ async def check_models(configuration: Configuration) -> list[Finding]:
     """Load both models, run the terrain network once, and compare them with the rover."""
     try:
         network = await asyncio.to_thread(load_terrain_network, configuration)  # it reads a file and runs the network
+        terrain = judge_card(network.card, configuration)
     except ModelError as error:
-        return [wrong("model", str(error), "")]
+        terrain = wrong("model", str(error), "")
     try:
-        posterior = await asyncio.to_thread(load_posterior, configuration)
+        loaded = await asyncio.to_thread(load_posterior, configuration)
+        posterior = judge_posterior(configuration, there=loaded is not None)
     except ModelError as error:
-        return [judge_card(network.card, configuration), wrong("posterior", str(error), "")]
-    return [judge_card(network.card, configuration), judge_posterior(configuration, there=posterior is not None)]
+        posterior = wrong("posterior", str(error), "")
+    return [terrain, posterior]
 
 
 def judge_posterior(configuration: Configuration, *, there: bool) -> Finding:

@@ -60,6 +60,7 @@ class AlarmInputs:
     store_torn: int = 0
     recording_problem: str = ""
     control_problem: str = ""
+    wheel_problem: str = ""
     broker_problem: str = ""
     model_problem: str = ""
     undecodable: tuple[str, ...] = ()
@@ -158,6 +159,11 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
             inputs.control_problem,
             "The rover cannot be commanded until this is corrected.",
         )
+    if inputs.wheel_problem:
+        remedy = (
+            "Look at these wheels before the next traverse, which ends this alarm: blocked, or a gear or drive failed."
+        )
+        yield Alarm("wheel", Severity.ERROR, inputs.wheel_problem, remedy)
     if inputs.stuck:
         which = ", ".join(f"{quantity.name} of wheel {wheel}" for quantity, wheel in inputs.stuck)
         text = f"{which}: the reading has been exactly constant for seconds, while other wheels' readings change"

@@ -62,6 +62,8 @@ class MqttSink:
         The publisher that delivers the messages.
     control_problem
         Returns why no commands can be taken, or an empty text.
+    wheel_problem
+        Returns which wheels have not done what the last traverse commanded, or an empty text.
     monotonic_ns
         The clock by which events are throttled and alarms end.
     """
@@ -72,11 +74,13 @@ class MqttSink:
         publisher: Publisher,
         *,
         control_problem: Callable[[], str] = lambda: "",
+        wheel_problem: Callable[[], str] = lambda: "",
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.publisher = publisher
         self._service = service
         self._control_problem = control_problem
+        self._wheel_problem = wheel_problem
         self._monotonic_ns = monotonic_ns
         self._started_ns = monotonic_ns()
         self._published_nodes: dict[int, NodeStatus] = {}
@@ -219,6 +223,7 @@ class MqttSink:
             store_torn=report.torn,
             recording_problem=(recorder.problem or "") if recorder is not None else "",
             control_problem=self._control_problem(),
+            wheel_problem=self._wheel_problem(),
             broker_problem=self._broker_problem(),
             model_problem=service.models.problem,
             undecodable=self._undecodable.lasting(self._monotonic_ns()),

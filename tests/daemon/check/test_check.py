@@ -315,7 +315,7 @@ async def test_a_network_that_does_not_suit_the_rover_is_reported(tmp_path: Path
     card = ModelCard("small-1", (Variable("load_N", "N", 1.0, 10.0),), (), 1.0)
     assert judge_card(card, Configuration()).verdict is Verdict.WARNING
     (tmp_path / "broken.onnx").write_bytes(b"no network")
-    (finding,) = await check_models(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
+    finding, _ = await check_models(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
     assert finding.verdict is Verdict.WRONG
     finding, _ = await check_models(Configuration())
     assert finding.verdict is Verdict.GOOD
@@ -380,3 +380,19 @@ async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_know
     for verdict, configuration in cases.items():
         _, finding = await check_models(configuration)
         assert (finding.subject, finding.verdict) == ("posterior", verdict)
+
+
+async def test_two_models_that_cannot_be_used_are_two_findings(tmp_path: Path) -> None:
+    """A terrain network that cannot be read does not hide what is wrong with the posterior's."""
+    (tmp_path / "empty.onnx").touch()
+    tables = {
+        "drivetrain": {"no_load_current_A": 0.037},
+        "estimator": {"model": tmp_path / "absent.onnx"},
+        "posterior": {"model": tmp_path / "empty.onnx"},
+    }
+    found = await check_models(Configuration.model_validate(tables))
+    assert [(each.subject, each.verdict) for each in found] == [
+        ("model", Verdict.WRONG),
+        ("posterior", Verdict.WRONG),
+    ]
+    assert ["absent.onnx" in found[0].text, "empty.onnx" in found[1].text] == [True, True]

@@ -33,6 +33,7 @@ TROUBLES = [
     ("store_torn", 1, "store", Severity.WARNING),
     ("recording_problem", "no room", "recording", Severity.ERROR),
     ("control_problem", "no such group", "control", Severity.WARNING),
+    ("wheel_problem", "wheel 3 (node 3) at 0.000", "wheel", Severity.ERROR),
     ("broker_problem", "connection refused", "broker", Severity.WARNING),
     ("model_problem", "no such file", "model", Severity.ERROR),
     ("undecodable", ("wrong-length of node 13",), "undecodable", Severity.WARNING),

@@ -228,6 +228,16 @@ async def test_check_and_ground_say_the_same(start: Callable[[str], Mosquitto], 
         await until(lambda: "requires a client certificate" in subscription.problem)
 
 
+async def test_check_names_the_certificate_that_is_accepted(
+    start: Callable[[str], Mosquitto], issued: Issued, tmp_path: Path
+) -> None:
+    """A broker that requires a client certificate does not accept anyone."""
+    settings = mqtt(start(secured(issued.ours, issued.broker)), issued, issued.kapvik)
+    (finding,) = await check_broker(Configuration(mqtt=Mqtt(spool_directory=tmp_path, **settings)))
+    assert finding.verdict == "good"
+    assert f"accepts the client of {issued.kapvik.path}, TLS" in finding.text
+
+
 FILES = {
     "absent ca_file": ({"ca_file": "absent.pem"}, "absent.pem"),
     "empty ca_file": ({"ca_file": "empty.pem"}, "empty.pem holds no certificate"),
