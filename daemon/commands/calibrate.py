@@ -100,6 +100,9 @@ def _finish(fit: Callable[[], ConfigurationUpdate], config: Path, write: bool) -
     from regolithd.calibration.drivetrain.bench.line_fit import BenchError
     from regolithd.calibration.mismatch.errors import RecordingError
 
+    if not config.is_file():
+        typer.echo(f"{config}: there is no such file. Name the rover's rover.toml with --config.", err=True)
+        raise typer.Exit(1)
     try:
         update = fit()
     except (BenchError, RecordingError, OSError) as error:

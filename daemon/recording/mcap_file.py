@@ -175,6 +175,11 @@ def is_closed(path: Path) -> bool:
         return closed_and_size(stream)[0]
 
 
+def first_time(path: Path) -> int:
+    """Return the time of the first message that can be read, in nanoseconds since 1970; 0 where there is none."""
+    return next((message.time_ns for message in read_messages(path, on_gap=lambda _: None)), 0)
+
+
 def _reporter(path: Path, on_gap: Callable[[str], None] | None) -> Callable[[str], None]:
     def fail(text: str) -> NoReturn:
         raise DamagedRecordingError(f"{path}: {text}.")
