@@ -65,16 +65,11 @@ def _remark(gaps: list[str], recordings: list[Path]) -> None:
     """Say what is damaged, empty, incomplete or out of order."""
     from itertools import pairwise
 
-    from regolithd.daemon.recording.mcap_file import first_time, is_closed
+    from regolithd.daemon.recording.mcap_file import first_time, incomplete
 
-    for gap in gaps:
-        typer.echo(gap, err=True)
+    for text in (*gaps, *filter(None, map(incomplete, recordings))):
+        typer.echo(text, err=True)
     begins = [(recording, begin) for recording in recordings if (begin := first_time(recording))]
-    for recording in recordings:
-        if not recording.stat().st_size:
-            typer.echo(f"{recording}: is empty: 0 bytes.", err=True)
-        elif not is_closed(recording):
-            typer.echo(f"{recording}: was not closed; what was recorded last may be missing.", err=True)
     for (before, begin), (recording, later) in pairwise(begins):
         if later < begin:
             what = f"begins before {before}, which is named before it, so the rows are not in chronological order"
