@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING
 
 from regolithd.daemon.control.metrics import NAME as METRICS
@@ -23,8 +22,6 @@ CONTROL = "control"
 CONTROL_TIMEOUT_S = 10.0
 """The control task counts as hung when it has not reported for this long."""
 _MEGABYTE = 1_000_000
-
-_log = logging.getLogger(__name__)
 
 
 def connect_sinks(service: Service) -> None:
@@ -52,9 +49,8 @@ def connect_sinks(service: Service) -> None:
 
 
 def open_stores(mqtt: Mqtt) -> Stores:
-    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, log why and keep messages in memory."""
+    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, both keep messages in memory, and say why."""
     try:
         return Stores.open(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
     except SpoolUnusableError as error:
-        _log.warning("%s Messages are kept in memory only.", error)
         return Stores.memory_only(mqtt.spool_directory, str(error))

@@ -39,8 +39,6 @@ def run(
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     configuration = configuration_or_exit(config)
     models = load_usable_models(configuration)
-    if models.problem:
-        logging.getLogger(__name__).error("%s Acquisition goes on without it.", models.problem)
     asyncio.run(_run(configuration, models))
 
 

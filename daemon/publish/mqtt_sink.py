@@ -1,4 +1,7 @@
-"""The MQTT sink of the service: publishes estimates and events as they come, health and alarms once a second."""
+"""The MQTT sink of the service: publishes estimates and events as they come, health and alarms once a second.
+
+Events and alarms are logged as well, here alone.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import time
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
+from regolithd.daemon.health.alarm_log import AlarmLog
 from regolithd.daemon.health.alarms import NO_INTRUDERS, Alarm, AlarmInputs, alarm_names, current_alarms
 from regolithd.daemon.health.event_throttle import EventThrottle
 from regolithd.daemon.health.prometheus import DaemonState, exposition
@@ -92,6 +96,7 @@ class MqttSink:
         self._undecodable = RisingCounts()
         self._connected_ns = self._started_ns
         self._throttle = EventThrottle()
+        self._log = AlarmLog(monotonic_ns)
         self._changes_scheduled = False
 
     def estimate(self, estimate: Estimate) -> None:
@@ -122,6 +127,7 @@ class MqttSink:
             asyncio.get_running_loop().call_soon(self._publish_changes)
 
     def _publish_event(self, event: NetworkEvent, suppressed: int) -> None:
+        self._log.event(event, suppressed)
         publish = self.publisher.publish
         publish("event", EventMessage, time_ns=event.time_ns, **event_fields(event), suppressed=suppressed)
         if isinstance(event, NodeEmergency):
@@ -175,6 +181,7 @@ class MqttSink:
         if alarm is not None:
             self._last_alarms[name] = alarm
         self._published_alarms[name] = alarm
+        self._log.alarm(name, alarm)
         now = time.time_ns()
         fields = asdict(self._last_alarms.get(name) or Alarm(name, Severity.WARNING, "", ""))
         fields |= {"active": alarm is not None, "since": iso_time(now)}
