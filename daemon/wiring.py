@@ -24,17 +24,10 @@ CONTROL_TIMEOUT_S = 10.0
 _MEGABYTE = 1_000_000
 
 
-def connect_sinks(service: Service) -> None:
-    """Add the MQTT sink and the control sink to a service.
-
-    Raises
-    ------
-    SpoolError
-        Another process uses the store of what is to be published.
-    """
+def connect_sinks(service: Service, stores: Stores) -> None:
+    """Add the MQTT sink, which sends what is in the stores, and the control sink to a service."""
     configuration, liveness = service.configuration, service.liveness
-    mqtt = configuration.mqtt
-    publisher = Publisher(configuration, open_stores(mqtt), beat=lambda: liveness.beat(PUBLISHING))
+    publisher = Publisher(configuration, stores, beat=lambda: liveness.beat(PUBLISHING))
     control = ControlSink(
         configuration,
         lambda: service.network,
@@ -49,7 +42,15 @@ def connect_sinks(service: Service) -> None:
 
 
 def open_stores(mqtt: Mqtt) -> Stores:
-    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, both keep messages in memory, and say why."""
+    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, messages stay in memory, and it says why.
+
+    To be opened before anything else is: a second daemon ends here, and leaves no file behind.
+
+    Raises
+    ------
+    SpoolError
+        Another process uses the store.
+    """
     try:
         return Stores.open(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
     except SpoolUnusableError as error:

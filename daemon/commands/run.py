@@ -51,14 +51,15 @@ async def _run(configuration: Configuration, models: OnnxModels) -> None:
 
     from regolithd.daemon.publish.spool import SpoolError
     from regolithd.daemon.service import Service
-    from regolithd.daemon.wiring import connect_sinks
+    from regolithd.daemon.wiring import connect_sinks, open_stores
 
-    service = Service(configuration, models)
     try:
-        connect_sinks(service)
+        stores = open_stores(configuration.mqtt)
     except SpoolError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
+    service = Service(configuration, models)
+    connect_sinks(service, stores)
     # Modules and models stay: each full collection would look through them, and delay a SYNC by tens of milliseconds.
     gc.collect()
     gc.freeze()

@@ -39,7 +39,7 @@ def test_messages_are_kept_in_memory_where_no_store_can_be_opened(
         recording=Recording(directory=tmp_path / "file" / "recordings"),
     )
     service = Service(configuration, load_usable_models(configuration))
-    wiring.connect_sinks(service)
+    wiring.connect_sinks(service, wiring.open_stores(configuration.mqtt))
     publishing = service.sinks[0]
     assert isinstance(publishing, MqttSink)
     with caplog.at_level(logging.WARNING):
@@ -73,7 +73,7 @@ def test_the_status_says_what_the_publisher_knows_of_the_broker(
         sinks=[],
         recorder=None,
     )
-    wiring.connect_sinks(service)
+    wiring.connect_sinks(service, wiring.open_stores(service.configuration.mqtt))
     (mqtt,) = (sink for sink in service.sinks if isinstance(sink, MqttSink))
     (control,) = (sink for sink in service.sinks if isinstance(sink, ControlSink))
     assert (control._broker(), control._rover()) == (told, "the network")
