@@ -42,7 +42,7 @@ def connect_sinks(service: Service, stores: Stores) -> None:
 
 
 def open_stores(mqtt: Mqtt) -> Stores:
-    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, messages stay in memory, and it says why.
+    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, both are in memory only, and say why.
 
     To be opened before anything else is: a second daemon ends here, and leaves no file behind.
 

@@ -119,14 +119,15 @@ _GUIDES = (
     ),
     AlarmGuide(
         "broker",
-        "There has been no connection to the MQTT broker for some time, or it refuses what is published.",
+        "There has been no lasting connection to the MQTT broker for some time, or it refuses what is published.",
         "Nothing is lost while the store has room: messages are sent, marked late, once there is a connection. Until "
         "then `regolithd status` and the journal say so.",
         (
             "The text says what failed, and which key to correct; `regolithd check` tries it again.",
             "Refused certificates: `docs/how-to/mqtt-tls.md` explains each message.",
+            "Two rovers with the same `[rover] name`: the broker disconnects one for the other, about once a second.",
         ),
-        "the daemon is connected.",
+        "the daemon has been connected for five seconds.",
     ),
     AlarmGuide(
         "model",

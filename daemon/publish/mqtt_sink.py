@@ -49,7 +49,7 @@ CLOCK_JUMP_NS = 500_000_000
 CLOCK_JUMP_ALARM_S = 60.0
 SOIL_CHANGE_ALARM_S = 120.0
 BROKER_ALARM_S = 10.0
-"""A broker that has not been reached for this long is an alarm: shorter losses happen on a radio link."""
+"""Without a stable connection to the broker for this long there is an alarm: shorter losses happen on a radio link."""
 PUBLISHING = "publishing"
 PUBLISHING_TIMEOUT_S = 10.0
 _PAGE_MB = resource.getpagesize() / 1e6
@@ -202,12 +202,12 @@ class MqttSink:
         network, now = self._service.network, self._monotonic_ns()
         if network is not None:
             self._undecodable.step(_undecodable(network), now)
-        if not self.publisher.problem:
+        if not self.publisher.recent_problem:
             self._connected_ns = now
 
     def _broker_problem(self) -> str:
         away = self._monotonic_ns() - self._connected_ns > BROKER_ALARM_S * 1e9
-        return self.publisher.problem if away else ""
+        return self.publisher.recent_problem if away else ""
 
     def _alarm_inputs(self) -> AlarmInputs:
         service = self._service

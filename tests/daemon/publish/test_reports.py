@@ -47,7 +47,7 @@ class Publisher:
     store_problem: str = ""
     session: str = "20261122T000000Z-aaaa"
     connected: bool = False
-    problem: str = ""
+    recent_problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
     def publish(self, topic: str, message: type, *, time_ns: int = T_NS, **fields: Any) -> None:
@@ -229,16 +229,16 @@ async def test_frames_that_cannot_be_decoded_are_an_alarm_when_they_last(service
 
 async def test_a_broker_that_stays_away_is_an_alarm(service: Any, clock: Clock) -> None:
     """The reason is told after ten seconds, until there is a connection again."""
-    publisher = Publisher(problem="the password file is not UTF-8")
+    publisher = Publisher(recent_problem="the password file is not UTF-8")
     sink = MqttSink(service, publisher, monotonic_ns=clock)  # type: ignore[arg-type]
     clock.now_s += 9.0
     sink._note_lasting_problems()
     assert sink._alarm_inputs().broker_problem == ""
     clock.now_s += 2.0
     assert sink._alarm_inputs().broker_problem == "the password file is not UTF-8"
-    publisher.problem = ""
+    publisher.recent_problem = ""
     sink._note_lasting_problems()
-    publisher.problem = "no answer"
+    publisher.recent_problem = "no answer"
     assert sink._alarm_inputs().broker_problem == ""
 
 
