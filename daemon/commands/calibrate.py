@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from regolithd.daemon.terminal import HELP_MARKUP
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -27,6 +29,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands."""
     bench = typer.Typer(
         no_args_is_help=True,
+        rich_markup_mode=HELP_MARKUP,
         help="Calibrate load cells, drivetrain and wheel radius from recordings, and write them into rover.toml.",
     )
     bench.command("load-cell")(load_cell)

@@ -54,11 +54,10 @@ def check(
 def _findings(configuration: Configuration, *, quiet: bool) -> list[Finding]:
     import asyncio
 
-    from rich.console import Console
-
     from regolithd.daemon.check.all_checks import check_everything
+    from regolithd.daemon.terminal import terminal
 
-    with Console(stderr=True, quiet=quiet).status("Checking bus, nodes, models, broker, disks and clock …"):
+    with terminal(stderr=True, quiet=quiet).status("Checking bus, nodes, models, broker, disks and clock …"):
         return asyncio.run(check_everything(configuration))
 
 
@@ -78,21 +77,23 @@ def _print_findings(findings: list[Finding], config: Path, *, as_json: bool) -> 
     from dataclasses import asdict
     from json import dumps
 
-    from rich.console import Console
+    from rich.text import Text
+
+    from regolithd.daemon.terminal import terminal
 
     if as_json:
         typer.echo(dumps([asdict(finding) for finding in findings], indent=2))
         return
-    console = Console()
+    console = terminal()
     console.print(_table(findings, config))
     wrong = sum(finding.verdict == "wrong" for finding in findings)
     warnings = sum(finding.verdict == "warning" for finding in findings)
     if wrong:
-        console.print(f"[bold red]{wrong} wrong[/], {warnings} warnings.", highlight=False)
+        console.print(Text.assemble((f"{wrong} wrong", "bold red"), f", {warnings} warnings."))
     elif warnings:
-        console.print(f"[yellow]Nothing wrong, {warnings} warnings.[/]")
+        console.print(f"Nothing wrong, {warnings} warnings.", style="yellow")
     else:
-        console.print("[green]Nothing wrong.[/]")
+        console.print("Nothing wrong.", style="green")
 
 
 def _table(findings: list[Finding], config: Path) -> Table:

@@ -43,13 +43,12 @@ def prove(  # each is an option of the command line
 
     A digest of each ground truth is written before its recording is analysed, so that the score can be verified.
     """
-    from rich.console import Console
-
     from regolithd.calibration.validation.blind_trials.batch import BASELINES, SOLVER, Batch
     from regolithd.calibration.validation.blind_trials.errors import ProofError
     from regolithd.calibration.validation.blind_trials.isolation import describe
+    from regolithd.daemon.terminal import terminal
 
-    console = Console()
+    console = terminal()
     drawn = secrets.randbits(63) if seed is None else seed
     batch = Batch(
         folder=out,
@@ -70,7 +69,7 @@ def prove(  # each is an option of the command line
     try:
         outcomes = _run(batch, console)
     except ProofError as error:
-        console.print(f"[red]{error}[/]", highlight=False)
+        console.print(str(error), style="red", highlight=False)
         raise typer.Exit(1) from error
     _report(outcomes, console, [out / "score.json", *([figures] if figures else [])])
 
