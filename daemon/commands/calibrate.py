@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from regolithd.daemon.terminal import HELP_MARKUP
+from regolithd.daemon.terminal import HELP_MARKUP, finite
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -72,8 +72,10 @@ def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = 
 
 def radius(
     recording: Recorded = None,
-    distance: Annotated[float, typer.Option(help="Measured distance in m.")] = 0.0,
-    distance_std: Annotated[float, typer.Option(help="Standard deviation of the distance in m.")] = 0.005,
+    distance: Annotated[float, typer.Option(callback=finite, help="Measured distance in m.")] = 0.0,
+    distance_std: Annotated[
+        float, typer.Option(callback=finite, help="Standard deviation of the distance in m.")
+    ] = 0.005,
     config: Config = ROVER_TOML,
     plot: Plot = None,
     write: Write = True,

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from regolithd.daemon.terminal import finite
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -36,7 +38,7 @@ def prove(  # each is an option of the command line
     ] = None,
     no_baselines: Annotated[bool, typer.Option("--no-baselines", help="Do not run the baselines.")] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings.")] = False,
-    duration: Annotated[float, typer.Option(help="Duration of each recording in s.")] = 1800.0,
+    duration: Annotated[float, typer.Option(callback=finite, help="Duration of each recording in s.")] = 1800.0,
     figures: Annotated[Path | None, typer.Option(help="Also write the score here, as one JSON object.")] = None,
 ) -> None:
     """Run blind trials of `regolithd mismatch`: recordings with hidden effects, scored beside four baselines.
