@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from regolithd.daemon.check.finding import Finding
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.daemon.config.reader import ConfigurationError
+    from regolithd.daemon.config.reader import Problem
 
 _STYLES = {"good": "green", "warning": "yellow", "wrong": "bold red", "not checked": "dim"}
 _MARKS = {"good": "✓", "warning": "!", "wrong": "✗", "not checked": "–"}
@@ -34,16 +34,19 @@ def check(
     """Check configuration, bus, nodes, broker, models, disks and clock; print each problem and its remedy.
 
     Changes and moves nothing, and does not disturb a running daemon. Exit status: 0 if nothing is wrong, 78 if the
-    configuration is invalid, 1 for any other problem.
+    configuration is invalid or, with `--syntax`, names a file of `[mqtt]` that is not there; 1 for any other problem.
     """
-    from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
+    from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, missing_files, read_configuration
 
     try:
         configuration = read_configuration(config)
     except ConfigurationError as error:
-        _print_problems(error, as_json=json)
+        _print_problems(error.problems, as_json=json)
         raise typer.Exit(EXIT_STATUS) from error
     if syntax:
+        if missing := missing_files(configuration, config):
+            _print_problems(missing, as_json=json)
+            raise typer.Exit(EXIT_STATUS)
         typer.echo(f"{config}: good")
         return
     findings = _findings(configuration, quiet=json)
@@ -61,15 +64,15 @@ def _findings(configuration: Configuration, *, quiet: bool) -> list[Finding]:
         return asyncio.run(check_everything(configuration))
 
 
-def _print_problems(error: ConfigurationError, *, as_json: bool) -> None:
+def _print_problems(problems: list[Problem], *, as_json: bool) -> None:
     from json import dumps
 
     if as_json:
-        typer.echo(dumps([{"subject": "configuration", "verdict": "wrong", "text": str(p)} for p in error.problems]))
+        typer.echo(dumps([{"subject": "configuration", "verdict": "wrong", "text": str(p)} for p in problems]))
         return
-    for problem in error.problems:
+    for problem in problems:
         typer.echo(str(problem), err=True)
-    count = len(error.problems)
+    count = len(problems)
     typer.echo(f"{count} problem{'s' if count != 1 else ''} in the configuration; nothing else was checked.", err=True)
 
 

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from regolithd.daemon.terminal import finite
-
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -27,9 +25,7 @@ def register(app: typer.Typer) -> None:
 def demo(
     *,
     out: Annotated[Path, typer.Option(help="Folder for recording, log, picture and report.")] = Path("build/demo"),
-    seconds: Annotated[
-        float, typer.Option(min=5, max=600, callback=finite, help="Duration of the live drive in s.")
-    ] = 44.0,
+    seconds: Annotated[float, typer.Option(min=5, max=600, help="Duration of the live drive in s.")] = 44.0,
     paper: Annotated[
         bool, typer.Option("--paper", help="Show the paper's network beside it, as a comparison.")
     ] = False,

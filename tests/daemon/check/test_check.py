@@ -37,7 +37,7 @@ GROUP = grp.getgrgid(os.getgid()).gr_name
 
 def check(*options: str) -> subprocess.CompletedProcess[str]:
     """Run `regolithd check` as a command."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "COLUMNS": "200"}
     command = [sys.executable, "-m", "regolithd", "check", *options]
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False, timeout=60)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -342,11 +343,11 @@ def test_a_number_that_is_not_finite_is_refused() -> None:
     group: Any = typer.main.get_command(app)
     calibrate = {("calibrate", name): each for name, each in group.commands["calibrate"].commands.items()}
     for path, command in ({(name,): each for name, each in group.commands.items()} | calibrate).items():
-        for option in (each for each in command.params if each.bare_type() is float):
+        for option in (each for each in command.params if each.bare_type() == "float"):
             for number in ("nan", "inf"):
                 done = regolithd(*path, f"{option.opts[0]}={number}")
                 assert done.exit_code == 2, (path, option.name)
-                assert "is not finite" in done.output or "is not in the range" in done.output
+                assert re.search("is not finite|be (less|greater) than", done.output)
             found += 1
     assert found >= 8
 
