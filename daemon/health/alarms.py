@@ -59,6 +59,8 @@ class AlarmInputs:
     store_damaged: int = 0
     store_torn: int = 0
     recording_problem: str = ""
+    recording_remedy: str = ""
+    recording_short: bool = False
     control_problem: str = ""
     broker_problem: str = ""
     model_problem: str = ""
@@ -143,8 +145,12 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
             "recording",
             Severity.ERROR,
             inputs.recording_problem,
-            "Free space on the disk, or correct [recording] directory.",
+            inputs.recording_remedy,
         )
+    elif inputs.recording_short:
+        text = "the disk has less room than [recording] limit_MB: the oldest recordings are deleted earlier"
+        remedy = "Copy recordings elsewhere and free space on the disk, or lower [recording] limit_MB."
+        yield Alarm("recording", Severity.WARNING, text, remedy)
     if inputs.broker_problem:
         remedy = "Messages are stored meanwhile, and sent, marked late, once there is a connection."
         yield Alarm("broker", Severity.WARNING, inputs.broker_problem, remedy)

@@ -108,14 +108,16 @@ _GUIDES = (
     ),
     AlarmGuide(
         "recording",
-        "The recording cannot be written.",
+        "The recording cannot be written (an error); or the disk has less room than `[recording] limit_MB`, and the "
+        "oldest recordings are deleted earlier (a warning).",
         "Acquisition and publishing go on. What is measured meanwhile is in the broker's clients only.",
         (
             "`df /var/lib/regolithd`: free space, or lower `[recording] limit_MB` below what the disk has.",
             "`ls -ld` of `[recording] directory`: it must belong to the user regolithd.",
             "Read-only file system: `dmesg` says why; check the disk.",
         ),
-        "a new pair of files could be begun; that is tried every ten seconds.",
+        "a new pair of files could be written, which is tried every ten seconds; or recordings and free space together "
+        "are as much as the limit.",
     ),
     AlarmGuide(
         "broker",

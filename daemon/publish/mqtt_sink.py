@@ -225,6 +225,8 @@ class MqttSink:
             store_damaged=report.damaged,
             store_torn=report.torn,
             recording_problem=(recorder.problem or "") if recorder is not None else "",
+            recording_remedy=recorder.remedy if recorder is not None else "",
+            recording_short=recorder is not None and recorder.deletes_early,
             control_problem=self._control_problem(),
             broker_problem=self._broker_problem(),
             model_problem=service.models.problem,

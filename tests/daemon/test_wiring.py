@@ -50,7 +50,9 @@ def test_messages_are_kept_in_memory_where_no_store_can_be_opened(
     store, recording = caplog.messages
     assert store.startswith(f"alarm store: {problem.rstrip('.')}. ")
     assert "messages are in memory only" in store
-    assert recording.startswith(f"alarm recording: {tmp_path}/file/recordings: ")
+    assert recording.startswith(
+        f"alarm recording: {tmp_path}/file/recordings: it, or a folder above it, is a file. Remove"
+    )
 
 
 @pytest.mark.parametrize(

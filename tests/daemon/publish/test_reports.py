@@ -90,7 +90,9 @@ def service(clock: Clock, tmp_path: Path) -> Any:
     return SimpleNamespace(
         configuration=configuration,
         network=network,
-        recorder=SimpleNamespace(paths=(tmp_path / "a.mcap", tmp_path / "a.log"), problem=None),
+        recorder=SimpleNamespace(
+            paths=(tmp_path / "a.mcap", tmp_path / "a.log"), problem=None, remedy="", deletes_early=True
+        ),
         bus_problem="",
         models=SimpleNamespace(problem=""),
         chain=SimpleNamespace(acquisition=Acquisition((), (), 1)),
@@ -198,7 +200,7 @@ def test_a_recording_without_a_file_or_a_disk_is_reported(service: Any, clock: C
 def test_alarm_inputs_come_from_every_part(service: Any, clock: Clock) -> None:
     """Also from the publisher's report and from the control socket."""
     report = REPORT.model_copy(update={"dropped": 1, "unstored": 2, "damaged": 3, "torn": 4})
-    service.recorder.problem = "no room"
+    service.recorder.problem, service.recorder.remedy = "no room", "free some"
     sink = MqttSink(
         service,
         Publisher(report),  # type: ignore[arg-type]
@@ -208,10 +210,12 @@ def test_alarm_inputs_come_from_every_part(service: Any, clock: Clock) -> None:
     found = sink._alarm_inputs()
     assert (found.store_dropped, found.store_unstored, found.store_damaged, found.store_torn) == (1, 2, 3, 4)
     assert (found.bus_state, found.kernel_drops, found.bus_problem) == (BusState.PASSIVE, 4, "")
-    assert (found.recording_problem, found.control_problem) == ("no room", "no group")
+    assert (found.recording_problem, found.recording_remedy, found.recording_short) == ("no room", "free some", True)
+    assert found.control_problem == "no group"
     service.network = service.recorder = None
     empty = sink._alarm_inputs()
     assert (empty.bus_state, empty.kernel_drops, empty.recording_problem, empty.nodes) == (BusState.ACTIVE, 0, "", {})
+    assert (empty.recording_remedy, empty.recording_short) == ("", False)
 
 
 async def test_frames_that_cannot_be_decoded_are_an_alarm_when_they_last(service: Any, clock: Clock) -> None:
