@@ -85,6 +85,7 @@ class MqttSink:
         self._started_ns = monotonic_ns()
         self._published_nodes: dict[int, NodeStatus] = {}
         self._published_alarms: dict[str, Alarm | None] = {}
+        self._since: dict[str, str] = {}
         self._offset_ns = time.time_ns() - monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
@@ -180,11 +181,13 @@ class MqttSink:
         """
         if alarm is not None:
             self._last_alarms[name] = alarm
+        now = time.time_ns()
+        if name not in self._since or (alarm is None) != (self._published_alarms.get(name) is None):
+            self._since[name] = iso_time(now)
         self._published_alarms[name] = alarm
         self._log.alarm(name, alarm)
-        now = time.time_ns()
         fields = asdict(self._last_alarms.get(name) or Alarm(name, Severity.WARNING, "", ""))
-        fields |= {"active": alarm is not None, "since": iso_time(now)}
+        fields |= {"active": alarm is not None, "since": self._since[name]}
         self.publisher.publish(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
 
     def _detect_clock_jump(self) -> None:
