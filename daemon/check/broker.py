@@ -50,5 +50,6 @@ async def check_broker(configuration: Configuration, running: Status | None = No
         text, _, remedy = rest.partition(". ")
         return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", remedy)]
     secured = "Unix socket" if mqtt.socket else "TLS" if mqtt.tls else "no TLS"
-    who = mqtt.username or "anyone (no username)"
+    holder = f"the holder of {mqtt.cert_file}" if mqtt.cert_file else "anyone (no username)"
+    who = mqtt.username or holder
     return [good("broker", f"{mqtt.address} accepts {who}, {secured}, after {1e3 * took:.0f} ms")]

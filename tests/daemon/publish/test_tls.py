@@ -113,6 +113,8 @@ async def test_a_rover_with_a_certificate_delivers(
         publisher.estimate(estimate())
         await until(lambda: publisher.report.acknowledged == 1)
     assert "u'kapvik'" in broker.log
+    (finding,) = await check_broker(configuration)
+    assert f"accepts the holder of {issued.kapvik.path}, TLS" in finding.text
 
 
 @pytest.mark.parametrize(
