@@ -10,6 +10,7 @@ from aiomqtt import Client, MqttError
 
 from regolithd.daemon.check.finding import Finding, good, wrong
 from regolithd.daemon.control.protocol import CONNECTED
+from regolithd.daemon.publish.broker_client import AIOMQTT_LOG
 from regolithd.daemon.publish.connection_errors import explain
 from regolithd.daemon.publish.credentials import password_of, tls_context
 from regolithd.daemon.publish.transport import transport_of
@@ -42,6 +43,7 @@ async def check_broker(configuration: Configuration, running: Status | None = No
             identifier=f"regolithd-check-{time.time_ns():x}",
             timeout=TIMEOUT_S,
             tls_context=tls_context(mqtt),
+            logger=AIOMQTT_LOG,
         )
         async with asyncio.timeout(2 * TIMEOUT_S), client:
             took = time.monotonic() - began

@@ -218,13 +218,16 @@ async def test_a_rover_with_the_certificate_of_another_loses_nothing(
         assert publisher.report.queued == 1
 
 
-async def test_check_and_ground_say_the_same(start: Callable[[str], Mosquitto], issued: Issued, tmp_path: Path) -> None:
-    """A missing client certificate, in `regolithd check` and on the ground."""
+async def test_check_and_ground_say_the_same(
+    start: Callable[[str], Mosquitto], issued: Issued, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A missing client certificate, in `regolithd check` and on the ground; the library logs nothing beside it."""
     settings = mqtt(start(secured(issued.ours, issued.broker)), issued, None)
     (finding,) = await check_broker(Configuration(mqtt=Mqtt(spool_directory=tmp_path, **settings)))
     assert finding.verdict == "wrong"
     assert "requires a client certificate" in finding.text
     assert finding.remedy.startswith("Set [mqtt] cert_file")
+    assert caplog.messages == []
     subscription = Subscription(Broker(**settings), lambda _: None)
     async with running(subscription):
         await until(lambda: "requires a client certificate" in subscription.problem)
