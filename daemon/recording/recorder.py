@@ -13,6 +13,7 @@ The wall clock may be set back at any time. It only names the files; pauses are 
 from __future__ import annotations
 
 import errno
+import os
 import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
@@ -68,8 +69,8 @@ class _Pair:
 
     @property
     def size(self) -> int:
-        """Bytes of both files on the disk."""
-        return self.mcap_path.stat().st_size + self.log_path.stat().st_size
+        """Bytes of both files; somebody may have moved them meanwhile."""
+        return self.mcap.size + os.fstat(self.log.fileno()).st_size
 
     def close(self) -> None:
         try:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -43,7 +44,8 @@ def make_room(folder: Path, limit_MB: float, stays: Path | None = None) -> Room:
     limit = limit_MB * MEGABYTE
     recordings: dict[Path, dict[Path, int]] = {}
     for path in oldest_first(folder):
-        recordings.setdefault(path.with_suffix(""), {})[path] = path.stat().st_size
+        with suppress(FileNotFoundError):  # somebody else has deleted it
+            recordings.setdefault(path.with_suffix(""), {})[path] = path.stat().st_size
     total = sum(sum(files.values()) for files in recordings.values())
     room = Room(min(limit, total + shutil.disk_usage(folder).free))
     early = False
@@ -53,9 +55,9 @@ def make_room(folder: Path, limit_MB: float, stays: Path | None = None) -> Room:
         if total <= limit and not room.is_short(folder):
             break
         early = early or total <= limit
-        for path in files:
-            path.unlink()
-        total -= sum(files.values())
+        for path, size in files.items():
+            path.unlink(missing_ok=True)
+            total -= size
     return Room(room.size, early)
 
 

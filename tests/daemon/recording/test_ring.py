@@ -80,6 +80,20 @@ def test_on_a_disk_smaller_than_the_limit_the_newest_stays_without_a_pause(
     assert sum(path.stat().st_size for path in logs) > 0.75 * capacity
 
 
+def test_files_that_are_moved_while_they_are_written_stop_nothing(tmp_path: Path, drive: Callable) -> None:
+    """The recording goes on where it is until the next pair is due."""
+    recorder = Recorder(Recording(directory=tmp_path / "recordings"), "can0", {})
+    frames = list(drive().frames(3))
+    for path in recorder.paths or ():
+        path.rename(tmp_path / path.name)
+    recorder.frames(frames)
+    recorder.flush()
+    assert recorder.problem is None
+    recorder.close()
+    (log,) = tmp_path.glob("*.log")
+    assert len(list(read_log(log))) == len(frames)
+
+
 def test_a_full_disk_leaves_no_empty_files_and_the_problem_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
