@@ -129,7 +129,7 @@ _GUIDES = (
             "Refused certificates: `docs/how-to/mqtt-tls.md` explains each message.",
             "Two rovers with the same `[rover] name`: the broker disconnects one for the other, about once a second.",
         ),
-        "the daemon has been connected for five seconds.",
+        "the daemon is connected; after one connection after another was lost, once one has lasted five seconds.",
     ),
     AlarmGuide(
         "model",

@@ -27,6 +27,7 @@ from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.pipeline.dead_reckoning import DeadReckoning
 from regolithd.daemon.pipeline.soil_change import soil_change_text
+from regolithd.daemon.publish.publisher import STABLE_CONNECTION_S
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits
 from regolithd.drivers.devices.decoding.decoder import Undecodable
@@ -49,7 +50,7 @@ CLOCK_JUMP_NS = 500_000_000
 CLOCK_JUMP_ALARM_S = 60.0
 SOIL_CHANGE_ALARM_S = 120.0
 BROKER_ALARM_S = 10.0
-"""Without a stable connection to the broker for this long there is an alarm: shorter losses happen on a radio link."""
+"""A broker that has not been reached for this long is an alarm: shorter losses happen on a radio link."""
 PUBLISHING = "publishing"
 PUBLISHING_TIMEOUT_S = 10.0
 _PAGE_MB = resource.getpagesize() / 1e6
@@ -95,7 +96,7 @@ class MqttSink:
         self._soil_change_until_ns = 0
         self._stuck_sensors = StuckSensorDetector()
         self._undecodable = RisingCounts()
-        self._connected_ns = self._started_ns
+        self._connected_ns = self._stable_ns = self._started_ns
         self._throttle = EventThrottle()
         self._log = AlarmLog(monotonic_ns)
         self._changes_scheduled = False
@@ -205,12 +206,17 @@ class MqttSink:
         network, now = self._service.network, self._monotonic_ns()
         if network is not None:
             self._undecodable.step(_undecodable(network), now)
-        if not self.publisher.recent_problem:
+        if not self.publisher.problem:
             self._connected_ns = now
+        if not self.publisher.recent_problem:
+            self._stable_ns = now
 
     def _broker_problem(self) -> str:
-        away = self._monotonic_ns() - self._connected_ns > BROKER_ALARM_S * 1e9
-        return self.publisher.recent_problem if away else ""
+        now, limit_ns = self._monotonic_ns(), BROKER_ALARM_S * 1e9
+        if now - self._connected_ns > limit_ns:
+            return self.publisher.problem
+        unstable = now - self._stable_ns > limit_ns + STABLE_CONNECTION_S * 1e9
+        return self.publisher.recent_problem if unstable else ""
 
     def _alarm_inputs(self) -> AlarmInputs:
         service = self._service

@@ -46,6 +46,7 @@ class Recorder:
 
     report: PublishingReport = NO_MESSAGES
     store_problem: str = ""
+    problem: str = ""
     recent_problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 

@@ -47,6 +47,7 @@ class Publisher:
     store_problem: str = ""
     session: str = "20261122T000000Z-aaaa"
     connected: bool = False
+    problem: str = ""
     recent_problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
@@ -233,16 +234,32 @@ async def test_frames_that_cannot_be_decoded_are_an_alarm_when_they_last(service
 
 async def test_a_broker_that_stays_away_is_an_alarm(service: Any, clock: Clock) -> None:
     """The reason is told after ten seconds, until there is a connection again."""
-    publisher = Publisher(recent_problem="the password file is not UTF-8")
+    publisher = Publisher(problem="the password file is not UTF-8", recent_problem="the password file is not UTF-8")
     sink = MqttSink(service, publisher, monotonic_ns=clock)  # type: ignore[arg-type]
     clock.now_s += 9.0
     sink._note_lasting_problems()
     assert sink._alarm_inputs().broker_problem == ""
     clock.now_s += 2.0
     assert sink._alarm_inputs().broker_problem == "the password file is not UTF-8"
-    publisher.recent_problem = ""
+    publisher.problem = ""
     sink._note_lasting_problems()
-    publisher.recent_problem = "no answer"
+    publisher.problem = "no answer"
+    assert sink._alarm_inputs().broker_problem == ""
+
+
+async def test_a_broker_that_is_lost_again_and_again_is_an_alarm(service: Any, clock: Clock) -> None:
+    """The reason is told after fifteen seconds, while connected as well, until a connection has lasted."""
+    publisher = Publisher()
+    sink = MqttSink(service, publisher, monotonic_ns=clock)  # type: ignore[arg-type]
+    publisher.recent_problem = "taken over"
+    for second in range(1, 20):
+        clock.now_s += 1.0
+        publisher.problem = "taken over" if second % 2 else ""
+        sink._note_lasting_problems()
+        assert sink._alarm_inputs().broker_problem == ("taken over" if second > 15 else ""), second
+    publisher.problem = publisher.recent_problem = ""
+    sink._note_lasting_problems()
+    publisher.recent_problem = "taken over"
     assert sink._alarm_inputs().broker_problem == ""
 
 
