@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from regolithd.daemon import commands
+from regolithd.daemon.terminal import HELP_MARKUP
 
 app = typer.Typer(
     name="regolithd",
@@ -20,6 +21,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=HELP_MARKUP,
 )
 
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import logging
 import time
 from contextlib import AsyncExitStack
 from dataclasses import asdict
@@ -46,8 +45,6 @@ if TYPE_CHECKING:
     from regolithd.drivers.can.frame import Frame
     from regolithd.drivers.devices.decoding.signals import Signal
     from regolithd.drivers.master.events import NetworkEvent
-
-_log = logging.getLogger(__name__)
 
 NETWORK, RECORDING = "network", "recording"
 TASK_TIMEOUT_S = 5.0
@@ -144,7 +141,7 @@ class Service:
             await self._network.run()
 
     async def _open_bus(self, opened: AsyncExitStack) -> Bus:
-        """Open the bus; while that fails, log why and try again."""
+        """Open the bus; while that fails, `bus_problem` says why, and it is tried again every `BUS_RETRY_S`."""
         settings = self.configuration.bus
         while True:
             try:
@@ -152,8 +149,6 @@ class Service:
                     open_bus(settings.interface, settings.channel, bitrate=settings.bitrate)
                 )
             except BusOpenError as error:
-                if str(error) != self.bus_problem:
-                    _log.warning("%s Trying again every %g s.", error, BUS_RETRY_S)
                 self.bus_problem = str(error)
                 await asyncio.sleep(BUS_RETRY_S)
             else:

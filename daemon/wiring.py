@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING
 
 from regolithd.daemon.control.metrics import NAME as METRICS
@@ -24,20 +23,11 @@ CONTROL_TIMEOUT_S = 10.0
 """The control task counts as hung when it has not reported for this long."""
 _MEGABYTE = 1_000_000
 
-_log = logging.getLogger(__name__)
 
-
-def connect_sinks(service: Service) -> None:
-    """Add the MQTT sink and the control sink to a service.
-
-    Raises
-    ------
-    SpoolError
-        Another process uses the store of what is to be published.
-    """
+def connect_sinks(service: Service, stores: Stores) -> None:
+    """Add the MQTT sink, which sends what is in the stores, and the control sink to a service."""
     configuration, liveness = service.configuration, service.liveness
-    mqtt = configuration.mqtt
-    publisher = Publisher(configuration, open_stores(mqtt), beat=lambda: liveness.beat(PUBLISHING))
+    publisher = Publisher(configuration, stores, beat=lambda: liveness.beat(PUBLISHING))
     control = ControlSink(
         configuration,
         lambda: service.network,
@@ -57,9 +47,16 @@ def connect_sinks(service: Service) -> None:
 
 
 def open_stores(mqtt: Mqtt) -> Stores:
-    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, log why and keep messages in memory."""
+    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, both are in memory only, and say why.
+
+    To be opened before anything else is: a second daemon ends here, and leaves no file behind.
+
+    Raises
+    ------
+    SpoolError
+        Another process uses the store.
+    """
     try:
         return Stores.open(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
     except SpoolUnusableError as error:
-        _log.warning("%s Messages are kept in memory only.", error)
         return Stores.memory_only(mqtt.spool_directory, str(error))

@@ -10,6 +10,7 @@ from aiomqtt import Client, MqttError
 
 from regolithd.daemon.check.finding import Finding, good, wrong
 from regolithd.daemon.control.protocol import CONNECTED
+from regolithd.daemon.publish.broker_client import AIOMQTT_LOG
 from regolithd.daemon.publish.connection_errors import explain
 from regolithd.daemon.publish.credentials import password_of, tls_context
 from regolithd.daemon.publish.transport import transport_of
@@ -42,6 +43,7 @@ async def check_broker(configuration: Configuration, running: Status | None = No
             identifier=f"regolithd-check-{time.time_ns():x}",
             timeout=TIMEOUT_S,
             tls_context=tls_context(mqtt),
+            logger=AIOMQTT_LOG,
         )
         async with asyncio.timeout(2 * TIMEOUT_S), client:
             took = time.monotonic() - began
@@ -50,5 +52,6 @@ async def check_broker(configuration: Configuration, running: Status | None = No
         text, _, remedy = rest.partition(". ")
         return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", remedy)]
     secured = "Unix socket" if mqtt.socket else "TLS" if mqtt.tls else "no TLS"
-    who = mqtt.username or (mqtt.client if mqtt.cert_file else "anyone (no username)")
+    holder = f"the holder of {mqtt.cert_file}" if mqtt.cert_file else "anyone (no username)"
+    who = mqtt.username or holder
     return [good("broker", f"{mqtt.address} accepts {who}, {secured}, after {1e3 * took:.0f} ms")]

@@ -5,22 +5,23 @@ from __future__ import annotations
 import asyncio
 import json
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from regolithd.daemon.check.finding import Finding, good, unknown, warning, wrong
 from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.can.socketcan import CAN_LINK_TYPE, NETWORK_LINKS
 from regolithd.drivers.errors import BusError
 from regolithd.drivers.master.bus_load import bus_load
 from regolithd.drivers.master.scan import scan
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from regolithd.daemon.config.configuration import Bus, Configuration
     from regolithd.daemon.control.protocol import Status
     from regolithd.drivers.master.scan import ScanResult
 
-CAN_LINK = "280"  # ARPHRD_CAN, if_arp.h
-_LINKS = Path("/sys/class/net")
+_LINKS = NETWORK_LINKS
 _UP = 0x1  # IFF_UP
 _HIGH_LOAD = 0.8  # bus load above which frames of low priority are delayed
 
@@ -59,11 +60,11 @@ def check_link(bus: Bus, details: dict[str, Any]) -> list[Finding]:
     folder = _LINKS / bus.channel
     up = f"`sudo ip link set {bus.channel} up type can bitrate {bus.bitrate}`, or regolithd-can@{bus.channel}.service."
     if not folder.exists():
-        there = [each.name for each in sorted(_LINKS.glob("*")) if _text(each / "type") == CAN_LINK]
+        there = [each.name for each in sorted(_LINKS.glob("*")) if _text(each / "type") == CAN_LINK_TYPE]
         others = f"there are {', '.join(there)}" if there else "there is no CAN link at all"
         remedy = "Plug in the CAN adapter and load its module, or correct [bus] channel."
         return [wrong("bus", f"there is no link {bus.channel!r}; {others}", remedy)]
-    if _text(folder / "type") != CAN_LINK:
+    if _text(folder / "type") != CAN_LINK_TYPE:
         return [wrong("bus", f"{bus.channel!r} is no CAN link", "Correct [bus] channel.")]
     if not int(_text(folder / "flags") or "0", 16) & _UP:
         return [wrong("bus", f"{bus.channel} is down", up)]

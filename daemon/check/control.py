@@ -46,5 +46,8 @@ def check_control(configuration: Configuration, running: Status | ControlError |
         remedy = f"`sudo usermod -aG {control.group} $USER`, and log in again."
         return [warning("control", f"you are not in the group {control.group!r} and may not command the rover", remedy)]
     if running is None:
+        if control.socket.exists() and not control.socket.is_socket():
+            remedy = "Remove it, or choose another path: [control] socket."
+            return [wrong("control", f"{control.socket} is not a socket", remedy)]
         return [unknown("control", f"you may command; no daemon is running at {control.socket}")]
     return [good("control", f"you may command; a daemon answers at {control.socket}")]

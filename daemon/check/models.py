@@ -17,17 +17,23 @@ if TYPE_CHECKING:
 
 async def check_models(configuration: Configuration) -> list[Finding]:
     """Load both models, run the terrain network once, and compare them with the rover."""
+    return [await _check_network(configuration), await _check_posterior(configuration)]
+
+
+async def _check_network(configuration: Configuration) -> Finding:
     try:
         network = await asyncio.to_thread(load_terrain_network, configuration)  # it reads a file and runs the network
-        terrain = judge_card(network.card, configuration)
     except ModelError as error:
-        terrain = wrong("model", str(error), "")
+        return wrong("model", str(error), "")
+    return judge_card(network.card, configuration)
+
+
+async def _check_posterior(configuration: Configuration) -> Finding:
     try:
-        loaded = await asyncio.to_thread(load_posterior, configuration)
-        posterior = judge_posterior(configuration, there=loaded is not None)
+        posterior = await asyncio.to_thread(load_posterior, configuration)
     except ModelError as error:
-        posterior = wrong("posterior", str(error), "")
-    return [terrain, posterior]
+        return wrong("posterior", str(error), "")
+    return judge_posterior(configuration, there=posterior is not None)
 
 
 def judge_posterior(configuration: Configuration, *, there: bool) -> Finding:

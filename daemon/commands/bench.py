@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from regolithd.daemon.terminal import finite
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -47,7 +49,7 @@ def bench(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of terrain and noise.")] = None,
     no_noise: Annotated[bool, typer.Option("--no-noise", help="Noise-free sensors, no terrain roughness.")] = False,
-    seconds: Annotated[float, typer.Option(help="Duration in s; 0: run until interrupted.")] = 0.0,
+    seconds: Annotated[float, typer.Option(callback=finite, help="Duration in s; 0: run until interrupted.")] = 0.0,
     control: Control = _CONTROL,
 ) -> None:
     """Run the virtual rover on a CAN bus: six drives, six load cells, inclinometer, ground-speed sensor.

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from pydantic import ValidationError
 
+from regolithd.daemon.terminal import HELP_MARKUP, finite
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -28,6 +30,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands."""
     bench = typer.Typer(
         no_args_is_help=True,
+        rich_markup_mode=HELP_MARKUP,
         help="Calibrate load cells, drivetrain and wheel radius from recordings, and write them into rover.toml.",
     )
     bench.command("load-cell")(load_cell)
@@ -70,8 +73,10 @@ def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = 
 
 def radius(
     recording: Recorded = None,
-    distance: Annotated[float, typer.Option(help="Measured distance in m.")] = 0.0,
-    distance_std: Annotated[float, typer.Option(help="Standard deviation of the distance in m.")] = 0.005,
+    distance: Annotated[float, typer.Option(callback=finite, help="Measured distance in m.")] = 0.0,
+    distance_std: Annotated[
+        float, typer.Option(callback=finite, help="Standard deviation of the distance in m.")
+    ] = 0.005,
     config: Config = ROVER_TOML,
     plot: Plot = None,
     write: Write = True,
@@ -102,6 +107,9 @@ def _finish(fit: Callable[[], ConfigurationUpdate], config: Path, write: bool) -
     from regolithd.calibration.mismatch.errors import RecordingError
     from regolithd.daemon.setup import configuration_or_exit
 
+    if not config.is_file():
+        typer.echo(f"{config}: there is no such file. Name the rover's rover.toml with --config.", err=True)
+        raise typer.Exit(1)
     try:
         update = fit()
     except ValidationError as error:

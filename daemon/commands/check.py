@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from regolithd.daemon.check.finding import Finding
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.daemon.config.reader import ConfigurationError
+    from regolithd.daemon.config.reader import Problem
 
 _STYLES = {"good": "green", "warning": "yellow", "wrong": "bold red", "not checked": "dim"}
 _MARKS = {"good": "✓", "warning": "!", "wrong": "✗", "not checked": "–"}
@@ -34,16 +34,19 @@ def check(
     """Check configuration, bus, nodes, broker, models, disks and clock; print each problem and its remedy.
 
     Changes and moves nothing, and does not disturb a running daemon. Exit status: 0 if nothing is wrong, 78 if the
-    configuration is invalid, 1 for any other problem.
+    configuration is invalid or, with `--syntax`, names a file of `[mqtt]` that is not there; 1 for any other problem.
     """
-    from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
+    from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, missing_files, read_configuration
 
     try:
         configuration = read_configuration(config)
     except ConfigurationError as error:
-        _print_problems(error, as_json=json)
+        _print_problems(error.problems, as_json=json)
         raise typer.Exit(EXIT_STATUS) from error
     if syntax:
+        if missing := missing_files(configuration, config):
+            _print_problems(missing, as_json=json)
+            raise typer.Exit(EXIT_STATUS)
         typer.echo(f"{config}: good")
         return
     findings = _findings(configuration, quiet=json)
@@ -54,23 +57,22 @@ def check(
 def _findings(configuration: Configuration, *, quiet: bool) -> list[Finding]:
     import asyncio
 
-    from rich.console import Console
-
     from regolithd.daemon.check.all_checks import check_everything
+    from regolithd.daemon.terminal import terminal
 
-    with Console(stderr=True, quiet=quiet).status("Checking bus, nodes, models, broker, disks and clock …"):
+    with terminal(stderr=True, quiet=quiet).status("Checking bus, nodes, models, broker, disks and clock …"):
         return asyncio.run(check_everything(configuration))
 
 
-def _print_problems(error: ConfigurationError, *, as_json: bool) -> None:
+def _print_problems(problems: list[Problem], *, as_json: bool) -> None:
     from json import dumps
 
     if as_json:
-        typer.echo(dumps([{"subject": "configuration", "verdict": "wrong", "text": str(p)} for p in error.problems]))
+        typer.echo(dumps([{"subject": "configuration", "verdict": "wrong", "text": str(p)} for p in problems]))
         return
-    for problem in error.problems:
+    for problem in problems:
         typer.echo(str(problem), err=True)
-    count = len(error.problems)
+    count = len(problems)
     typer.echo(f"{count} problem{'s' if count != 1 else ''} in the configuration; nothing else was checked.", err=True)
 
 
@@ -78,21 +80,23 @@ def _print_findings(findings: list[Finding], config: Path, *, as_json: bool) -> 
     from dataclasses import asdict
     from json import dumps
 
-    from rich.console import Console
+    from rich.text import Text
+
+    from regolithd.daemon.terminal import terminal
 
     if as_json:
         typer.echo(dumps([asdict(finding) for finding in findings], indent=2))
         return
-    console = Console()
+    console = terminal()
     console.print(_table(findings, config))
     wrong = sum(finding.verdict == "wrong" for finding in findings)
     warnings = sum(finding.verdict == "warning" for finding in findings)
     if wrong:
-        console.print(f"[bold red]{wrong} wrong[/], {warnings} warnings.", highlight=False)
+        console.print(Text.assemble((f"{wrong} wrong", "bold red"), f", {warnings} warnings."))
     elif warnings:
-        console.print(f"[yellow]Nothing wrong, {warnings} warnings.[/]")
+        console.print(f"Nothing wrong, {warnings} warnings.", style="yellow")
     else:
-        console.print("[green]Nothing wrong.[/]")
+        console.print("Nothing wrong.", style="green")
 
 
 def _table(findings: list[Finding], config: Path) -> Table:

@@ -40,16 +40,15 @@ def demo(
     import asyncio
     from importlib.util import find_spec
 
-    from rich.console import Console
-
     if missing := [name for name in PACKAGES if find_spec(name) is None]:
         typer.echo(f"the demo needs {' and '.join(missing)}: pip install 'regolithd[demo]', or `make demo`", err=True)
         raise typer.Exit(1)
 
     from regolithd.daemon.demo.run import run_demo
     from regolithd.daemon.demo.screen import screen
+    from regolithd.daemon.terminal import terminal
 
-    console = Console()
+    console = terminal()
     out.mkdir(parents=True, exist_ok=True)
     with screen(console, seconds, paper=paper) as show:
         done = asyncio.run(run_demo(out, seconds, show))
@@ -68,7 +67,7 @@ def _results(console: Console, done: DemoRun, out: Path, *, paper: bool) -> None
     records = done.ground_truth.records
     live = [record for record in records if record[0].snapshot.time_ns >= done.live_from_ns]
     for line in crossings(records, done.live_from_ns).lines:
-        console.print(f"[bold]{line}[/]" if "alarm" in line else line, highlight=False)
+        console.print(line, style="bold" if "alarm" in line else None, highlight=False)
     console.print(posterior_table(posteriors_on_soils(records)))
     if paper:
         console.print(wheel_table(wheels_on_soils(live, settle_s=SETTLE_S)))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from regolithd.daemon.terminal import finite
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -37,7 +39,9 @@ def evaluate(
     ),
     rovers: Annotated[int, typer.Option(min=100, help="Number of simulated rovers on held-out soils.")] = 10_000,
     drives: Annotated[int, typer.Option(min=10, help="Number of drives for the alarm.")] = 400,
-    hours: Annotated[float, typer.Option(min=0.1, help="Duration of each drive over one soil in h.")] = 1.0,
+    hours: Annotated[
+        float, typer.Option(min=0.1, callback=finite, help="Duration of each drive over one soil in h.")
+    ] = 1.0,
     part: Annotated[Part, typer.Option(help="Evaluate only this part; the other's figures are kept.")] = Part.ALL,
     seed: Annotated[int, typer.Option(help="Seed; must differ from the training's.")] = 31_907_442,
 ) -> None:

@@ -36,21 +36,20 @@ def loop(
     """
     import json
 
-    from rich.console import Console
-
     from regolithd.calibration.models import TERRAIN_MODEL
     from regolithd.daemon.closed_loop.case import cases
     from regolithd.daemon.closed_loop.picture import draw
     from regolithd.daemon.closed_loop.run import DriveLengths, run_case
     from regolithd.daemon.closed_loop.summary import figures_of, sentence
     from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
+    from regolithd.daemon.terminal import terminal
 
     lengths = DriveLengths(first_s=400.0, second_s=180.0, stretch_m=1.1) if short else DriveLengths()
     chosen = [each for each in cases(seed) if not case or each.name in case]
     network = TerrainNetwork(TERRAIN_MODEL)
-    console = Console()
+    console = terminal()
     done = []
-    with Console(stderr=True).status("") as status:
+    with terminal(stderr=True).status("") as status:
         for each in chosen:
             show = partial(_show, status, each.title)
             done.append(run_case(each, seed, out / each.name, network, lengths, show))

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from regolithd.daemon.terminal import finite
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -36,20 +38,19 @@ def prove(  # each is an option of the command line
     ] = None,
     no_baselines: Annotated[bool, typer.Option("--no-baselines", help="Do not run the baselines.")] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings.")] = False,
-    duration: Annotated[float, typer.Option(help="Duration of each recording in s.")] = 1800.0,
+    duration: Annotated[float, typer.Option(callback=finite, help="Duration of each recording in s.")] = 1800.0,
     figures: Annotated[Path | None, typer.Option(help="Also write the score here, as one JSON object.")] = None,
 ) -> None:
     """Run blind trials of `regolithd mismatch`: recordings with hidden effects, scored beside four baselines.
 
     A digest of each ground truth is written before its recording is analysed, so that the score can be verified.
     """
-    from rich.console import Console
-
     from regolithd.calibration.validation.blind_trials.batch import BASELINES, SOLVER, Batch
     from regolithd.calibration.validation.blind_trials.errors import ProofError
     from regolithd.calibration.validation.blind_trials.isolation import describe
+    from regolithd.daemon.terminal import terminal
 
-    console = Console()
+    console = terminal()
     drawn = secrets.randbits(63) if seed is None else seed
     batch = Batch(
         folder=out,
@@ -70,7 +71,7 @@ def prove(  # each is an option of the command line
     try:
         outcomes = _run(batch, console)
     except ProofError as error:
-        console.print(f"[red]{error}[/]", highlight=False)
+        console.print(str(error), style="red", highlight=False)
         raise typer.Exit(1) from error
     _report(outcomes, console, [out / "score.json", *([figures] if figures else [])])
 

@@ -39,8 +39,6 @@ def run(
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     configuration = configuration_or_exit(config)
     models = load_usable_models(configuration)
-    if models.problem:
-        logging.getLogger(__name__).error("%s Acquisition goes on without it.", models.problem)
     asyncio.run(_run(configuration, models))
 
 
@@ -53,14 +51,15 @@ async def _run(configuration: Configuration, models: OnnxModels) -> None:
 
     from regolithd.daemon.publish.spool import SpoolError
     from regolithd.daemon.service import Service
-    from regolithd.daemon.wiring import connect_sinks
+    from regolithd.daemon.wiring import connect_sinks, open_stores
 
-    service = Service(configuration, models)
     try:
-        connect_sinks(service)
+        stores = open_stores(configuration.mqtt)
     except SpoolError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
+    service = Service(configuration, models)
+    connect_sinks(service, stores)
     # Modules and models stay: each full collection would look through them, and delay a SYNC by tens of milliseconds.
     gc.collect()
     gc.freeze()

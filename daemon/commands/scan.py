@@ -34,15 +34,14 @@ def scan(
     from dataclasses import asdict
     from json import dumps
 
-    from rich.console import Console
-
     from regolithd.daemon.check.scan import scan_bus
     from regolithd.daemon.setup import configuration_or_exit
+    from regolithd.daemon.terminal import terminal
     from regolithd.drivers.errors import BusError
 
     configuration = _on(configuration_or_exit(config), interface, channel)
     try:
-        with Console(stderr=True, quiet=json).status("Asking 127 node-IDs …"):
+        with terminal(stderr=True, quiet=json).status("Asking 127 node-IDs …"):
             found = asyncio.run(scan_bus(configuration, known=config is not None))
     except (BusError, ExceptionGroup) as error:
         reason = error if isinstance(error, BusError) else error.exceptions[0]
@@ -51,7 +50,7 @@ def scan(
     if json:
         typer.echo(dumps([asdict(each) for each in found], indent=2))
     else:
-        Console().print(_table(found) if found else "No node answers or sends on this bus.")
+        terminal().print(_table(found) if found else "No node answers or sends on this bus.")
 
 
 def _on(configuration: Configuration, interface: str | None, channel: str | None) -> Configuration:
@@ -63,10 +62,9 @@ def _on(configuration: Configuration, interface: str | None, channel: str | None
 def _table(found: list[ScannedNode]) -> Table:
     from rich import box
     from rich.table import Table
-    from rich.text import Text
 
     table = Table("node", "device", "identity", "state", "errors", "in rover.toml", box=box.SIMPLE_HEAD, expand=True)
     for each in found:
         cells = (str(each.node_id), each.device, each.identity, each.state, each.errors, each.needs)
-        table.add_row(*map(Text, cells))  # as text: `[nodes]` is no markup
+        table.add_row(*cells)
     return table

@@ -23,7 +23,11 @@ def schema(
     if write is None:
         typer.echo(files["asyncapi.json"], nl=False)
         return
-    write.mkdir(parents=True, exist_ok=True)
-    for name, text in files.items():
-        (write / name).write_text(text, encoding="utf-8")
+    try:
+        write.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            (write / name).write_text(text, encoding="utf-8")
+    except OSError as error:
+        typer.echo(f"{write}: {error.strerror}. Name a folder that can be written with --write.", err=True)
+        raise typer.Exit(1) from error
     typer.echo(f"{len(files)} files written to {write}.")

@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.table import Table
+    from rich.text import Text
 
     from regolithd.daemon.control.protocol import Status
 
@@ -33,10 +34,9 @@ def status(
 
 
 async def _status(path: Path, *, as_json: bool) -> int:
-    from rich.console import Console
-
     from regolithd.daemon.control.client import control_connection
     from regolithd.daemon.control.protocol import Status, StatusRequest
+    from regolithd.daemon.terminal import terminal
 
     async with control_connection(path) as daemon:
         daemon.send(StatusRequest())
@@ -47,31 +47,35 @@ async def _status(path: Path, *, as_json: bool) -> int:
     if as_json:
         typer.echo(reply.model_dump_json(indent=2))
     else:
-        console = Console()
-        console.print(_head(reply), highlight=False)
+        console = terminal()
+        console.print(_head(reply))
         console.print(_table(reply))
     return int(not reply.nodes or any(node.phase != "operational" for node in reply.nodes))
 
 
-def _head(status: Status) -> str:
+def _head(status: Status) -> Text:
+    from rich.text import Text
+
     driven = status.traverse
     traverse = "none" if driven is None else f"{driven.turned_m:.3f} m turned, {driven.elapsed_s:.1f} s"
-    return (
-        f"[bold]{status.rover}[/] · bus {status.bus} · broker {status.broker} · "
-        f"{status.snapshots} snapshots at {status.rate_Hz:g} Hz · traverse: {traverse}"
+    return Text.assemble(
+        (status.rover, "bold"),
+        f" · bus {status.bus} · broker {status.broker} · "
+        f"{status.snapshots} snapshots at {status.rate_Hz:g} Hz · traverse: {traverse}",
     )
 
 
 def _table(status: Status) -> Table:
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     table = Table("node", "kind", "wheel", "phase", "drive", "problem", box=box.SIMPLE_HEAD, expand=True)
     colours = {"operational": "green", "booting": "yellow"}
     for node in status.nodes:
         colour = colours.get(node.phase, "red")
         wheel = "" if node.wheel is None else str(node.wheel)
-        phase = f"[{colour}]{node.phase}[/]"
+        phase = Text(node.phase, style=colour)
         table.add_row(
             str(node.node_id), node.kind, wheel, phase, node.drive_state or "", "" if colour == "green" else node.text
         )

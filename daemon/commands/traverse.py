@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from regolithd.daemon.terminal import finite
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
@@ -25,8 +27,10 @@ def register(app: typer.Typer) -> None:
 
 def traverse(
     *,
-    distance: Annotated[float, typer.Option(help="Distance of the wheels' rims in m.")],
-    speed: Annotated[float, typer.Option(help="Speed of the wheels' rims in m/s; negative: backwards.")] = 0.022,
+    distance: Annotated[float, typer.Option(callback=finite, help="Distance of the wheels' rims in m.")],
+    speed: Annotated[
+        float, typer.Option(callback=finite, help="Speed of the wheels' rims in m/s; negative: backwards.")
+    ] = 0.022,
     config: Config = None,
 ) -> None:
     """Drive a distance at constant wheel speed through the running daemon, then stop with the drives' ramp.

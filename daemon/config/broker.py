@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import stat
 from contextlib import suppress
 from ipaddress import ip_address
 from pathlib import Path  # noqa: TC003  # pydantic reads it at run time
@@ -68,6 +69,24 @@ class BrokerSettings(Table):
         if self.username is not None:
             return f"user {self.username!r}"
         return f"the client of {self.cert_file}" if self.cert_file else "a client without a user name"
+
+
+def missing_credentials(mqtt: BrokerSettings) -> Iterator[tuple[str, str, str, str]]:
+    """Yield key, expected value, found value and remedy of each file that is named and is not there.
+
+    It is no reason to refuse the configuration: the daemon measures and records without a broker.
+    """
+    for key in ("password_file", "ca_file", "cert_file", "key_file"):
+        path: Path | None = getattr(mqtt, key)
+        try:
+            found = path is None or stat.S_ISREG(path.stat().st_mode)
+        except PermissionError:  # its folder is for the daemon alone, and so for this user it cannot be said
+            continue
+        except OSError:
+            found = False
+        if path is not None and not found:
+            what = "a folder" if path.is_dir() else "not there"
+            yield f"mqtt.{key}", "a file", f"{path}, which is {what}", "Write it, or correct the path."
 
 
 def broker_contradictions(mqtt: BrokerSettings) -> Iterator[tuple[str, str, str, str]]:

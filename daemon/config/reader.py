@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from regolithd.daemon.config import wording
-from regolithd.daemon.config.broker import broker_contradictions
+from regolithd.daemon.config.broker import broker_contradictions, missing_credentials
 from regolithd.daemon.config.configuration import MASTER_NODE, Configuration, Nodes
 from regolithd.drivers.devices.profiles.compose import DescriptionError, compose
 from regolithd.drivers.errors import DictionaryError
@@ -76,6 +76,11 @@ def read_configuration(path: Path) -> Configuration:
 def parse_configuration(text: str, path: Path) -> Configuration:
     """Return the configuration of a TOML text, or raise with all its problems. `path` is the file that it came from."""
     return _parse(text, path, Configuration, _checks_together)
+
+
+def missing_files(configuration: Configuration, path: Path) -> list[Problem]:
+    """Return a problem for each file that `[mqtt]` of this rover.toml names, and that is not there."""
+    return list(_problems_together(missing_credentials(configuration.mqtt), path.read_text(encoding="utf-8"), path))
 
 
 def read_tables(path: Path, model: type[Model], checks: Checks[Model]) -> Model:

@@ -129,14 +129,12 @@ class ControlSink:
             self._traverse.stop(event.text, quick=True)
 
     async def run(self) -> None:
-        """Serve until cancelled. If the socket cannot be created, log why, and try again every `RETRY_S`."""
+        """Serve until cancelled. If the socket cannot be created, `problem` says why; try again every `RETRY_S`."""
         settings = self._configuration.control
         while True:
             try:
                 listener = open_control_socket(settings.socket, settings.group)
             except ControlSocketError as error:
-                if str(error) != self.problem:
-                    _log.warning("no commands can be taken: %s", error)
                 self.problem = str(error)
                 await self._pause(RETRY_S)
                 continue

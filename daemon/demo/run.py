@@ -22,7 +22,7 @@ from regolithd.daemon.demo.story import SPEED_M_S, fast_part, story_scenario
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
-from regolithd.daemon.wiring import connect_sinks
+from regolithd.daemon.wiring import connect_sinks, open_stores
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.master.network import NodePhase
 from regolithd.drivers.virtual import VirtualRover
@@ -104,7 +104,7 @@ async def run_demo(folder: Path, seconds: float, show: Show) -> DemoRun:
             show.computing(computed_s, duration_s)
             await asyncio.sleep(0)
         table = LiveTable(f"{configuration.mqtt.prefix}/{configuration.rover.name}", world)
-        connect_sinks(service)
+        connect_sinks(service, open_stores(configuration.mqtt))
         service.sinks.append(truth)
         subscribed = asyncio.Event()
         background = [

@@ -59,6 +59,8 @@ class AlarmInputs:
     store_damaged: int = 0
     store_torn: int = 0
     recording_problem: str = ""
+    recording_remedy: str = ""
+    recording_short: bool = False
     control_problem: str = ""
     wheel_problem: str = ""
     broker_problem: str = ""
@@ -77,6 +79,7 @@ def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
         *_bus_alarms(inputs),
         *_intruder_alarms(inputs),
         *_undecodable_alarms(inputs),
+        *_wheel_alarms(inputs),
         *_daemon_alarms(inputs),
     ]
     return {alarm.name: alarm for alarm in found}
@@ -139,13 +142,7 @@ def _intruder_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
 
 def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     yield from _store_alarms(inputs)
-    if inputs.recording_problem:
-        yield Alarm(
-            "recording",
-            Severity.ERROR,
-            inputs.recording_problem,
-            "Free space on the disk, or correct [recording] directory.",
-        )
+    yield from _recording_alarms(inputs)
     if inputs.broker_problem:
         remedy = "Messages are stored meanwhile, and sent, marked late, once there is a connection."
         yield Alarm("broker", Severity.WARNING, inputs.broker_problem, remedy)
@@ -159,11 +156,6 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
             inputs.control_problem,
             "The rover cannot be commanded until this is corrected.",
         )
-    if inputs.wheel_problem:
-        remedy = (
-            "Look at these wheels before the next traverse, which ends this alarm: blocked, or a gear or drive failed."
-        )
-        yield Alarm("wheel", Severity.ERROR, inputs.wheel_problem, remedy)
     if inputs.stuck:
         which = ", ".join(f"{quantity.name} of wheel {wheel}" for quantity, wheel in inputs.stuck)
         text = f"{which}: the reading has been exactly constant for seconds, while other wheels' readings change"
@@ -179,6 +171,23 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
         text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
         remedy = "Synchronise it before the daemon starts (time-sync.target)."
         yield Alarm("clock", Severity.WARNING, text, remedy, latching=True)
+
+
+def _recording_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.recording_problem:
+        yield Alarm("recording", Severity.ERROR, inputs.recording_problem, inputs.recording_remedy)
+    elif inputs.recording_short:
+        text = "the disk has less room than [recording] limit_MB: the oldest recordings are deleted earlier"
+        remedy = "Copy recordings elsewhere and free space on the disk, or lower [recording] limit_MB."
+        yield Alarm("recording", Severity.WARNING, text, remedy)
+
+
+def _wheel_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.wheel_problem:
+        remedy = (
+            "Look at these wheels before the next traverse, which ends this alarm: blocked, or a gear or drive failed."
+        )
+        yield Alarm("wheel", Severity.ERROR, inputs.wheel_problem, remedy)
 
 
 def _soil_change(changed: SoilChange) -> Alarm:

@@ -50,7 +50,7 @@ class AlarmMessage(Header):
     active: bool
     severity: Severity
     since: Time
-    """When it became active, or ended."""
+    """When it became active; where `active` is false, when it ended, or when the session began."""
     text: str
     """What is wrong. After its end, the last text; empty if it was not active in this session."""
     remedy: str

@@ -108,25 +108,28 @@ _GUIDES = (
     ),
     AlarmGuide(
         "recording",
-        "The recording cannot be written.",
+        "The recording cannot be written (an error); or the disk has less room than `[recording] limit_MB`, and the "
+        "oldest recordings are deleted earlier (a warning).",
         "Acquisition and publishing go on. What is measured meanwhile is in the broker's clients only.",
         (
             "`df /var/lib/regolithd`: free space, or lower `[recording] limit_MB` below what the disk has.",
             "`ls -ld` of `[recording] directory`: it must belong to the user regolithd.",
             "Read-only file system: `dmesg` says why; check the disk.",
         ),
-        "a new pair of files could be begun; that is tried every ten seconds.",
+        "a new pair of files could be written, which is tried every ten seconds; or recordings and free space together "
+        "are as much as the limit.",
     ),
     AlarmGuide(
         "broker",
-        "There has been no connection to the MQTT broker for some time, or it refuses what is published.",
+        "There has been no lasting connection to the MQTT broker for some time, or it refuses what is published.",
         "Nothing is lost while the store has room: messages are sent, marked late, once there is a connection. Until "
         "then `regolithd status` and the journal say so.",
         (
             "The text says what failed, and which key to correct; `regolithd check` tries it again.",
             "Refused certificates: `docs/how-to/mqtt-tls.md` explains each message.",
+            "Two rovers with the same `[rover] name`: the broker disconnects one for the other, about once a second.",
         ),
-        "the daemon is connected.",
+        "the daemon is connected; after one connection after another was lost, once one has lasted five seconds.",
     ),
     AlarmGuide(
         "model",

@@ -50,7 +50,9 @@ class NodeMessage(Header):
     text: str
     """The same reason as text, with what to do."""
     boots: int
+    """How often it has booted in this session."""
     emergencies: int
+    """EMCY messages in this session, with those that say that an error is reset (code 0x0000)."""
 
 
 class EmergencyMessage(Header):

@@ -61,11 +61,14 @@ class Channel:
 
 _ONCE, _ACKNOWLEDGED = QoS.AT_MOST_ONCE, QoS.AT_LEAST_ONCE
 
+_POSTERIOR = "twice a second while wheels turn, and for `[posterior] window_s` after"
+"""Its window then holds what was measured before."""
+
 CHANNELS = (
     Channel("state", "state", StateMessage, _ACKNOWLEDGED, True, False, "at the start and end of each connection"),
     Channel("snapshot", "snapshot", SnapshotMessage, _ACKNOWLEDGED, False, True, "at each SYNC, in order"),
     Channel("wheel", "wheel/{wheel}", WheelMessage, _ONCE, False, False, "up to 20 times a second, while connected"),
-    Channel("posterior", "posterior", PosteriorMessage, _ACKNOWLEDGED, False, True, "twice a second while wheels turn"),
+    Channel("posterior", "posterior", PosteriorMessage, _ACKNOWLEDGED, False, True, _POSTERIOR),
     Channel("odometry", "odometry", OdometryMessage, _ACKNOWLEDGED, False, True, "twice a second while wheels turn"),
     Channel("node", "node/{node_id}", NodeMessage, _ACKNOWLEDGED, True, True, "when the node's state changes"),
     Channel("emcy", "emcy", EmergencyMessage, _ACKNOWLEDGED, False, True, "when a node sends one"),

@@ -155,7 +155,11 @@ wheels 1 to 6.
   comes from the store, because the broker could not be reached when it was created. It may repeat one that was
   received before: compare `session` and `sequence`.
 - `state` is `online` from birth to death. An `offline` ends the `online` of the same `session` and `sequence`, and no
-  other. While `state` is `offline`, retained messages may be out of date.
+  other. While `state` is `offline`, retained messages may be out of date. While it is `online`, a retained
+  `node/…` or `alarm/…` of an earlier `session` is of a node that is in the configuration no longer: leave it out. (The
+  broker keeps it until somebody publishes an empty retained message there: `mosquitto_pub -r -n -t TOPIC`.)
+- `sequence` has gaps on `state`, where it counts attempts to connect, and on `wheel/…` and `health`, which are not
+  stored while the broker cannot be reached. On the other topics a gap is a loss.
 - `snapshot` is complete and in order. `wheel/…` carries the newest values without waiting for older ones, and is not
   stored while the broker cannot be reached.
 

@@ -69,7 +69,8 @@ class Header(BaseModel):
     session: str
     """Identifies one run of the daemon; sorts by start time."""
     sequence: Annotated[int, Field(ge=0)]
-    """Counts within a session and topic; on `snapshot` and `wheel` the number of the SYNC."""
+    """Counts within a session and topic; on `snapshot` and `wheel` the number of the SYNC, on `state` that of the
+    attempt to connect. Numbers are left out only where a channel is not stored while the broker cannot be reached."""
     time: Time
     time_ms: Annotated[int, Field(ge=0)]
     """The same time in milliseconds since 1970, for programs that read numbers only."""

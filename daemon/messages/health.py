@@ -39,6 +39,7 @@ class PublishingReport(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     connections: int
+    """Attempts to connect in this session, with those that failed."""
     queued: int
     queued_MB: float
     acknowledged: int

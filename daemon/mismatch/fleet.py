@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from regolithd.calibration.mismatch.data.columns import rovers_in
@@ -29,6 +28,7 @@ from regolithd.daemon.mismatch.recordings import read_one
 from regolithd.daemon.mismatch.terminal import print_answer
 from regolithd.daemon.recording.export import recorded_snapshots
 from regolithd.daemon.recording.mcap_file import DamagedRecordingError, read_metadata
+from regolithd.daemon.terminal import terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -242,7 +242,7 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
     if outputs.report:
         paths = list(dict.fromkeys(file.path for file in files))
         write_fleet_page(outputs.report, replace(found, answer=answer), paths, simulation)
-    print_answer(Console(), answer, found.evidence.labels)
+    print_answer(terminal(), answer, found.evidence.labels)
     return answer
 
 
@@ -259,8 +259,8 @@ def _notes_of_nameless(answer: FleetAnswer, files: Sequence[RoverFile]) -> list[
 
 
 def _bar() -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=terminal(stderr=True), transient=True)
 
 
 def _kept_beside(catalogue: Path) -> Path:

@@ -6,7 +6,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
@@ -16,6 +15,7 @@ from regolithd.daemon.mismatch.files import Outputs, write_json, write_page
 from regolithd.daemon.mismatch.fleet import FleetOptions, files_of_rovers, run_fleet, too_long_at_once
 from regolithd.daemon.mismatch.recordings import read_recordings
 from regolithd.daemon.mismatch.terminal import print_answer
+from regolithd.daemon.terminal import terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,7 +46,7 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
     if options.asked_for or len({file.rover for file in files if not file.damaged}) > 1 or too_long_at_once(files):
         return run_fleet(files, simulation, outputs, options)
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
-    with Console(stderr=True).status("reading") as status:
+    with terminal(stderr=True).status("reading") as status:
         recorded = read_recordings(recordings, simulated.wheel_column)
         try:
             found = compare(recorded, simulated, progress=status.update)
@@ -56,7 +56,7 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
         write_json(outputs.json, found.answer)
     if outputs.report:
         write_page(outputs.report, found, recordings, simulation)
-    print_answer(Console(), found.answer, Labels.of(found.evidence), found.evidence.wheels)
+    print_answer(terminal(), found.answer, Labels.of(found.evidence), found.evidence.wheels)
     if outputs.corrected:  # last: an answer that it cannot hold is an answer all the same
         try:
             found.write_corrected(outputs.corrected, empirical=outputs.empirical)

@@ -6,7 +6,7 @@ import textwrap
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
+from rich.text import Text
 
 from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
 from regolithd.calibration.mismatch.inference.rounding import with_interval
@@ -55,9 +55,10 @@ def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Seque
     or a pipe gets each on one line.
     """
     doubt = doubt_of(answer)
-    console.print(f"[bold]{answer.verdict}[/bold]{f', {doubt}' if doubt else ''}")
+    console.print(Text.assemble((answer.verdict, "bold"), f", {doubt}" if doubt else ""))
     for line in _lines(answer, labels, wheels):
-        console.print(escape(_wrapped(line, console.width if console.is_terminal else 0)), soft_wrap=True)
+        text = _wrapped(line, console.width if console.is_terminal else 0)
+        console.print(text, soft_wrap=True, markup=False, emoji=False)
 
 
 def sure_of(answer: Answer) -> str:

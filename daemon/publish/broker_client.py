@@ -29,6 +29,8 @@ _UNSUPPORTED_PROTOCOL_VERSION = 132  # MQTT 5, 2.4; paho also gives it for retur
 _NOT_AUTHORIZED = 135
 _QUOTA_EXCEEDED = 151
 _log = logging.getLogger(__name__)
+AIOMQTT_LOG = logging.getLogger("regolithd.daemon.publish.aiomqtt")
+AIOMQTT_LOG.setLevel(logging.CRITICAL)  # each error is raised as well, and told by whoever connects
 
 
 class PublishRefusedError(MqttCodeError):

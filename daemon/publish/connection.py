@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from aiomqtt import MqttError, ProtocolVersion, Will
 
-from regolithd.daemon.publish.broker_client import BrokerClient
+from regolithd.daemon.publish.broker_client import AIOMQTT_LOG, BrokerClient
 from regolithd.daemon.publish.credentials import password_of, tls_context
 from regolithd.daemon.publish.transport import transport_of
 
@@ -131,7 +131,7 @@ class Connection:
             max_inflight_messages=WINDOW + OTHERS_WINDOW,
             tls_context=tls_context(settings),
             socket_options=transport.socket_options,
-            logger=_aiomqtt_log,
+            logger=AIOMQTT_LOG,
         )
         client.pending_calls_threshold = 2 * (WINDOW + OTHERS_WINDOW)
         return client
@@ -229,5 +229,3 @@ def _first(group: BaseExceptionGroup[MqttError]) -> MqttError:
 
 
 _log = logging.getLogger(__name__)
-_aiomqtt_log = logging.getLogger("regolithd.daemon.publish.aiomqtt")
-_aiomqtt_log.setLevel(logging.CRITICAL)  # the publisher logs each error once

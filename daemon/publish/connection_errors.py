@@ -8,6 +8,8 @@ import ssl
 from typing import TYPE_CHECKING
 
 from aiomqtt import MqttCodeError
+from paho.mqtt.enums import MQTTErrorCode
+from paho.mqtt.reasoncodes import ReasonCode
 
 from regolithd.daemon.publish.broker_client import PublishRefusedError
 from regolithd.daemon.publish.tls_probe import NO_TLS_THERE, tls_problem
@@ -15,8 +17,18 @@ from regolithd.daemon.publish.tls_probe import NO_TLS_THERE, tls_problem
 if TYPE_CHECKING:
     from regolithd.daemon.config.broker import BrokerSettings
 
-_CREDENTIALS_CODES = (4, 5, 134, 135)  # CONNACK of MQTT 3.1.1 and of MQTT 5
+_CREDENTIALS_CODES = (134, 135)  # CONNACK of MQTT 5; paho translates those of MQTT 3.1.1, 4 and 5, to them
 _SESSION_TAKEN_OVER = 142
+_LOST = frozenset(
+    {
+        MQTTErrorCode.MQTT_ERR_NO_CONN,
+        MQTTErrorCode.MQTT_ERR_CONN_REFUSED,
+        MQTTErrorCode.MQTT_ERR_CONN_LOST,
+        MQTTErrorCode.MQTT_ERR_ERRNO,
+        MQTTErrorCode.MQTT_ERR_KEEPALIVE,
+    }
+)
+"""What paho returns for a publish once the connection is lost."""
 _OF_ALERT = {
     "CERTIFICATE_EXPIRED": "the client certificate has expired. Renew [mqtt] cert_file, or correct the broker's clock",
     "UNKNOWN_CA": "the broker does not know the authority of the client certificate. Correct [mqtt] cert_file: it must"
@@ -139,14 +151,28 @@ def _is_lost(error: Exception) -> bool:
     return "Disconnected" in str(error) or "connection was lost" in str(error)
 
 
+def _brokers_code(error: BaseException | None) -> int | None:
+    """Return the reason code that the broker refused or ended the connection with, or None where it gave none.
+
+    A number alone is an error of paho itself: its 4 (not connected) and 5 are no refusals of MQTT 3.1.1.
+    """
+    while error is not None:
+        if isinstance(error, MqttCodeError) and isinstance(error.rc, ReasonCode):
+            return int(error.rc.value)
+        error = error.__cause__
+    return None
+
+
 def _refusal(error: Exception, settings: BrokerSettings) -> str:
     if isinstance(error, PublishRefusedError):
         return (
             f"{settings.client} may not publish on {error.topic}. Correct [mqtt] username or cert_file, [rover] name,"
             " or the broker's access rules."
         )
-    code = getattr(error.rc, "value", error.rc) if isinstance(error, MqttCodeError) else None
-    if code == _SESSION_TAKEN_OVER or _is_lost(error):
+    code = _brokers_code(error)
+    if code == _SESSION_TAKEN_OVER:
+        return "another client uses the same [rover] name and took the connection over. Give each rover its own name."
+    if _is_lost(error) or (isinstance(error, MqttCodeError) and isinstance(error.rc, int) and error.rc in _LOST):
         return "the connection was lost. If it repeats immediately, another client uses the same [rover] name."
     if code in _CREDENTIALS_CODES and settings.username is None:
         who = "the client certificate" if settings.cert_file else "a client without a user name"

@@ -21,6 +21,7 @@ def password_of(settings: BrokerSettings) -> str | None:
     """
     if settings.password_file is None:
         return None
+    _check_readable(settings.password_file, "password_file")
     try:
         return settings.password_file.read_text(encoding="utf-8").strip()
     except UnicodeDecodeError:
@@ -39,9 +40,9 @@ def tls_context(settings: BrokerSettings) -> ssl.SSLContext | None:
     """
     if not settings.tls:
         return None
-    for file in (settings.ca_file, settings.cert_file, settings.key_file):
-        if file is not None:
-            file.open("rb").close()  # ssl's own error does not name the file
+    for key in ("ca_file", "cert_file", "key_file"):
+        if (file := getattr(settings, key)) is not None:
+            _check_readable(file, key)  # ssl's own error does not name the file
     try:
         context = ssl.create_default_context(cafile=settings.ca_file)
     except ssl.SSLError:
@@ -52,6 +53,21 @@ def tls_context(settings: BrokerSettings) -> ssl.SSLContext | None:
         assert settings.key_file is not None  # noqa: S101  # the reader accepts both or neither
         _load_client_certificate(context, settings.cert_file, settings.key_file)
     return context
+
+
+def _check_readable(file: Path, key: str) -> None:
+    """Raise an OSError that names the key and the remedy where a file cannot be read."""
+    try:
+        file.open("rb").close()
+    except FileNotFoundError:
+        raise OSError(f"{file} is not there. Write it, or correct [mqtt] {key}") from None
+    except IsADirectoryError:
+        raise OSError(f"{file} is a folder. Name a file in [mqtt] {key}") from None
+    except PermissionError:
+        remedy = f"Let the group of the daemon's user read [mqtt] {key}: chgrp, and mode 640"
+        raise OSError(f"{file} may not be read by this user. {remedy}") from None
+    except OSError as error:
+        raise OSError(f"{file}: {error.strerror}. Correct [mqtt] {key}") from None
 
 
 def _load_client_certificate(context: ssl.SSLContext, certificate: Path, key: Path) -> None:

@@ -1,4 +1,7 @@
-"""The MQTT sink of the service: publishes estimates and events as they come, health and alarms once a second."""
+"""The MQTT sink of the service: publishes estimates and events as they come, health and alarms once a second.
+
+Events and alarms are logged as well, here alone.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import time
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
+from regolithd.daemon.health.alarm_log import AlarmLog
 from regolithd.daemon.health.alarms import NO_INTRUDERS, Alarm, AlarmInputs, alarm_names, current_alarms
 from regolithd.daemon.health.event_throttle import EventThrottle
 from regolithd.daemon.health.prometheus import DaemonState, exposition
@@ -23,6 +27,7 @@ from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.pipeline.dead_reckoning import DeadReckoning
 from regolithd.daemon.pipeline.soil_change import soil_change_text
+from regolithd.daemon.publish.publisher import STABLE_CONNECTION_S
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits
 from regolithd.drivers.devices.decoding.decoder import Undecodable
@@ -85,6 +90,7 @@ class MqttSink:
         self._started_ns = monotonic_ns()
         self._published_nodes: dict[int, NodeStatus] = {}
         self._published_alarms: dict[str, Alarm | None] = {}
+        self._since: dict[str, str] = {}
         self._offset_ns = time.time_ns() - monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
@@ -94,8 +100,9 @@ class MqttSink:
         self._soil_change_until_ns = 0
         self._stuck_sensors = StuckSensorDetector()
         self._undecodable = RisingCounts()
-        self._connected_ns = self._started_ns
+        self._connected_ns = self._stable_ns = self._started_ns
         self._throttle = EventThrottle()
+        self._log = AlarmLog(monotonic_ns)
         self._changes_scheduled = False
 
     def estimate(self, estimate: Estimate) -> None:
@@ -126,6 +133,7 @@ class MqttSink:
             asyncio.get_running_loop().call_soon(self._publish_changes)
 
     def _publish_event(self, event: NetworkEvent, suppressed: int) -> None:
+        self._log.event(event, suppressed)
         publish = self.publisher.publish
         publish("event", EventMessage, time_ns=event.time_ns, **event_fields(event), suppressed=suppressed)
         if isinstance(event, NodeEmergency):
@@ -178,10 +186,13 @@ class MqttSink:
         """
         if alarm is not None:
             self._last_alarms[name] = alarm
-        self._published_alarms[name] = alarm
         now = time.time_ns()
+        if name not in self._since or (alarm is None) != (self._published_alarms.get(name) is None):
+            self._since[name] = iso_time(now)
+        self._published_alarms[name] = alarm
+        self._log.alarm(name, alarm)
         fields = asdict(self._last_alarms.get(name) or Alarm(name, Severity.WARNING, "", ""))
-        fields |= {"active": alarm is not None, "since": iso_time(now)}
+        fields |= {"active": alarm is not None, "since": self._since[name]}
         self.publisher.publish(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
 
     def _detect_clock_jump(self) -> None:
@@ -201,10 +212,15 @@ class MqttSink:
             self._undecodable.step(_undecodable(network), now)
         if not self.publisher.problem:
             self._connected_ns = now
+        if not self.publisher.recent_problem:
+            self._stable_ns = now
 
     def _broker_problem(self) -> str:
-        away = self._monotonic_ns() - self._connected_ns > BROKER_ALARM_S * 1e9
-        return self.publisher.problem if away else ""
+        now, limit_ns = self._monotonic_ns(), BROKER_ALARM_S * 1e9
+        if now - self._connected_ns > limit_ns:
+            return self.publisher.problem
+        unstable = now - self._stable_ns > limit_ns + STABLE_CONNECTION_S * 1e9
+        return self.publisher.recent_problem if unstable else ""
 
     def _alarm_inputs(self) -> AlarmInputs:
         service = self._service
@@ -222,6 +238,8 @@ class MqttSink:
             store_damaged=report.damaged,
             store_torn=report.torn,
             recording_problem=(recorder.problem or "") if recorder is not None else "",
+            recording_remedy=recorder.remedy if recorder is not None else "",
+            recording_short=recorder is not None and recorder.deletes_early,
             control_problem=self._control_problem(),
             wheel_problem=self._wheel_problem(),
             broker_problem=self._broker_problem(),

@@ -128,6 +128,13 @@ class Publisher:
         return "" if self.connected else self._problem
 
     @property
+    def recent_problem(self) -> str:
+        """Why there is no connection, or why the last one ended, until one has lasted `STABLE_CONNECTION_S`."""
+        up = self._up_since
+        stable = self.connected and up is not None and time.monotonic() - up > STABLE_CONNECTION_S
+        return "" if stable else self._problem
+
+    @property
     def store_problem(self) -> str:
         """Why messages are kept in memory only; empty while they are stored."""
         return self._stores.problem

@@ -62,10 +62,20 @@ def open_log(path: Path) -> AbstractContextManager[IO[str]]:
     return path.open(encoding="ascii", errors="replace")
 
 
-def read_log(path: Path, opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log) -> Iterator[Frame]:
-    """Yield the frames of a log in their order; incomplete lines and lines that are not frames are skipped."""
+def read_log(
+    path: Path,
+    opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log,
+    on_unreadable: Callable[[int], None] = lambda _: None,
+) -> Iterator[Frame]:
+    """Yield the frames of a log in their order; lines that are not frames are skipped.
+
+    `on_unreadable` is called with the number of each, from 1; not of an incomplete last one, as a killed program leaves
+    it.
+    """
     with opening(path) as lines:
-        for line in lines:
+        for number, line in enumerate(lines, start=1):
             frame = parse_line(line)
             if frame is not None:
                 yield frame
+            elif line.endswith("\n"):
+                on_unreadable(number)

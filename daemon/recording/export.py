@@ -8,6 +8,7 @@ from typing import IO, TYPE_CHECKING
 from regolithd.daemon.pipeline.snapshot import WHEELS
 from regolithd.daemon.recording.content import SNAPSHOT, snapshot_from_json
 from regolithd.daemon.recording.mcap_file import open_mcap, read_messages
+from regolithd.daemon.recording.replacement import NO_ROW, ExportError, replacing
 from regolithd.drivers.devices.registry import QUANTITIES
 
 if TYPE_CHECKING:
@@ -21,10 +22,6 @@ COLUMNS = tuple(quantity for quantity in QUANTITIES if not quantity.flags)
 HEADER = ("t_s", "wheel", *(column.name for column in COLUMNS))
 
 Row = tuple[float | int | None, ...]
-
-
-class ExportError(Exception):
-    """The table cannot be written; the message says why and what to do."""
 
 
 def recorded_snapshots(
@@ -59,6 +56,8 @@ def export(
 ) -> int:
     """Write `out`, CSV or Parquet by its name; return the number of rows. `opening` may show progress.
 
+    Where this fails, a file that was there before stays as it was.
+
     Raises
     ------
     ExportError
@@ -68,9 +67,10 @@ def export(
     """
     write = {".csv": _write_csv, ".parquet": _write_parquet}.get(out.suffix)
     if write is None:
-        raise ExportError(f"{out}: the suffix {out.suffix!r} is not supported. Name it .csv or .parquet.")
-    if not (count := write(rows(recorded_snapshots(recordings, opening, on_gap)), out)):
-        raise ExportError(f"{out}: 0 rows. The recordings hold no snapshot that can be read.")
+        raise ExportError(f"{out}: the suffix {out.suffix!r} is not supported. Name it .csv, .parquet or .nc.")
+    with replacing(out) as beside:
+        if not (count := write(rows(recorded_snapshots(recordings, opening, on_gap)), beside)):
+            raise ExportError(NO_ROW.format(out))
     return count
 
 
@@ -91,7 +91,7 @@ def _write_parquet(table: Iterator[Row], out: Path) -> int:
         import pyarrow.parquet as pq  # noqa: PLC0415  # likewise
     except ImportError as error:
         raise ExportError(
-            f"{out}: Parquet needs pyarrow, which the rover does not have. "
+            "Parquet needs pyarrow, which the rover does not have. "
             "`pip install 'regolithd[calibration]'`, or export to .csv."
         ) from error
     content = list(table)

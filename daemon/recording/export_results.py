@@ -9,7 +9,7 @@ import numpy as np
 
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.pipeline.snapshot import WHEELS
-from regolithd.daemon.recording.export import ExportError
+from regolithd.daemon.recording.replacement import NO_ROW, ExportError, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,6 +37,8 @@ NEEDS_SCIPY = "needs SciPy: pip install 'regolithd[calibration]', or export to .
 def export_results(results: Results, out: Path) -> int:
     """Write CSV, Parquet or NetCDF by the name of `out`; return the number of instants.
 
+    Where this fails, a file that was there before stays as it was.
+
     Raises
     ------
     ExportError
@@ -46,8 +48,9 @@ def export_results(results: Results, out: Path) -> int:
     if write is None:
         raise ExportError(f"{out}: the suffix {out.suffix!r} is not supported. Name it .csv, .parquet or .nc.")
     if not len(results.time_ns):
-        raise ExportError(f"{out}: 0 rows. The recordings hold no snapshot that can be read.")
-    write(results, out)
+        raise ExportError(NO_ROW.format(out))
+    with replacing(out) as beside:
+        write(results, beside)
     return len(results.time_ns)
 
 
@@ -74,7 +77,7 @@ def _parquet(results: Results, out: Path) -> None:
         import pyarrow as pa  # noqa: PLC0415  # the rover does not have it
         import pyarrow.parquet as pq  # noqa: PLC0415  # likewise
     except ImportError as error:
-        raise ExportError(f"{out}: Parquet {NEEDS_PYARROW}") from error
+        raise ExportError(f"Parquet {NEEDS_PYARROW}") from error
     time_ns = np.repeat(results.time_ns, WHEELS)
     columns = {
         "time": pa.array(time_ns, pa.timestamp("ns", "UTC")),
@@ -93,7 +96,7 @@ def _netcdf(results: Results, out: Path) -> None:
     try:
         from scipy.io import netcdf_file  # noqa: PLC0415  # the rover does not have it
     except ImportError as error:
-        raise ExportError(f"{out}: NetCDF {NEEDS_SCIPY}") from error
+        raise ExportError(f"NetCDF {NEEDS_SCIPY}") from error
     with netcdf_file(str(out), "w", version=2) as file:
         file.Conventions = "CF-1.8"
         file.title = "Measurements and estimates of a rover, by regolithd"

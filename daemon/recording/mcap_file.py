@@ -175,6 +175,18 @@ def is_closed(path: Path) -> bool:
         return closed_and_size(stream)[0]
 
 
+def incomplete(path: Path) -> str:
+    """Return that the file is empty, or that its end may be missing; an empty text where it is complete."""
+    if not path.stat().st_size:
+        return f"{path}: is empty: 0 bytes."
+    return "" if is_closed(path) else f"{path}: was not closed; what was recorded last may be missing."
+
+
+def first_time(path: Path) -> int:
+    """Return the time of the first message that can be read, in nanoseconds since 1970; 0 where there is none."""
+    return next((message.time_ns for message in read_messages(path, on_gap=lambda _: None)), 0)
+
+
 def _reporter(path: Path, on_gap: Callable[[str], None] | None) -> Callable[[str], None]:
     def fail(text: str) -> NoReturn:
         raise DamagedRecordingError(f"{path}: {text}.")

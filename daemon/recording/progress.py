@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import IO, TYPE_CHECKING
 
-from rich.console import Console
+from rich.markup import escape
 from rich.progress import open as open_with_bar
+
+from regolithd.daemon.terminal import terminal
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -14,13 +16,13 @@ if TYPE_CHECKING:
 
 def open_text(path: Path) -> AbstractContextManager[IO[str]]:
     """Open a text file with a progress bar."""
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
     return open_with_bar(
         path,
         "r",
         encoding="ascii",
         errors="replace",
-        description=path.name,
+        description=escape(path.name),
         console=console,
         transient=True,
         disable=not console.is_terminal,
@@ -29,7 +31,7 @@ def open_text(path: Path) -> AbstractContextManager[IO[str]]:
 
 def open_binary(path: Path) -> AbstractContextManager[IO[bytes]]:
     """Open a binary file with a progress bar."""
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
     return open_with_bar(
-        path, "rb", description=path.name, console=console, transient=True, disable=not console.is_terminal
+        path, "rb", description=escape(path.name), console=console, transient=True, disable=not console.is_terminal
     )

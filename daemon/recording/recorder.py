@@ -3,27 +3,27 @@
 | event | what the recorder does |
 |---|---|
 | `flush`, called every `FLUSH_S` | writes to the kernel, so that a killed daemon loses less than the last second |
-| `file_minutes` have passed | closes the pair, begins a new one |
-| all files together exceed `limit_MB`, or the disk has less than `RESERVE` of it left | deletes the oldest files |
-| the disk fails or is full | closes the pair, sets `problem`, tries a new pair every `RETRY_S`; nothing else stops |
+| `file_minutes` have passed, or the pair is a tenth of the room (`ring`) | closes the pair, begins a new one |
+| all files together exceed `limit_MB`, or the disk is nearly full | deletes the oldest pairs (`ring`) |
+| the disk fails | closes the pair, sets `problem`, tries a new pair every `RETRY_S`; nothing else stops |
 
-The wall clock may be set back at any time. It only names the files; pauses are measured by a monotonic clock, and
-NUMBER, which rises from pair to pair, says which files are the oldest.
+The wall clock may be set back at any time. It only names the files; pauses are measured by a monotonic clock.
 """
 
 from __future__ import annotations
 
-import re
-import shutil
+import errno
+import os
 import time
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
 from typing import IO, TYPE_CHECKING
 
 from regolithd.daemon.recording.candump import frame_line
 from regolithd.daemon.recording.content import ESTIMATE, EVENT, SNAPSHOT, estimate_json, snapshot_json
 from regolithd.daemon.recording.layout import write_layout
 from regolithd.daemon.recording.mcap_file import McapFile
+from regolithd.daemon.recording.ring import LARGEST_SHARE, MEGABYTE, Room, make_room, next_stem
 from regolithd.daemon.recording.schemas import schema
 
 if TYPE_CHECKING:
@@ -36,10 +36,21 @@ if TYPE_CHECKING:
 
 FLUSH_S = 0.4
 RETRY_S = 10.0
-MEGABYTE = 1_000_000
-RESERVE = 0.05
-"""Share of the limit that must stay free on the disk; otherwise the oldest recordings are deleted."""
-_NUMBERED = re.compile(r"rover-\d{8}T\d{6}Z-(\d{6,})")
+_NO_FOLDER = ("it, or a folder above it, is a file", "Remove it, or choose another: [recording] directory.")
+_FULL = ("the disk is full", "Free space on the disk, or lower [recording] limit_MB.")
+_EXPLAINED = {
+    errno.EEXIST: _NO_FOLDER,
+    errno.ENOTDIR: _NO_FOLDER,
+    errno.ENOSPC: _FULL,
+    errno.EDQUOT: _FULL,
+    errno.EACCES: (
+        "the daemon may not write there",
+        "Make the daemon's user its owner, or choose another: [recording] directory.",
+    ),
+    errno.EROFS: ("the disk is mounted read-only", "`dmesg` says why; check the disk, and mount it writable."),
+}
+"""errno of an operation on a file → what is wrong, and what to do."""
+_OTHER_REMEDY = "`dmesg` may say more; check the disk, or correct [recording] directory."
 
 
 @dataclass(slots=True)
@@ -55,6 +66,11 @@ class _Pair:
     def flush(self) -> None:
         self.log.flush()
         self.mcap.flush()
+
+    @property
+    def size(self) -> int:
+        """Bytes of both files; somebody may have moved them meanwhile."""
+        return self.mcap.size + os.fstat(self.log.fileno()).st_size
 
     def close(self) -> None:
         try:
@@ -99,7 +115,9 @@ class Recorder:
         self._monotonic_ns = monotonic_ns
         self._pair: _Pair | None = None
         self._retry_ns = 0
+        self._room = Room(settings.limit_MB * MEGABYTE)
         self.problem: str | None = None
+        self.remedy = ""  # of `problem`
         self.lost = 0  # frames that could not be written
         self._attempt(self._open)
 
@@ -138,8 +156,22 @@ class Recorder:
                 self._attempt(self._open)
             return
         self._attempt(self._pair.flush)
-        if self._pair and now - self._pair.begun_ns > self._settings.file_minutes * 60e9:
-            self._attempt(self._begin_new_pair)
+        if self._pair:
+            self._attempt(lambda: self._keep_within_room(now))
+
+    def _keep_within_room(self, now: int) -> None:
+        """Begin the next pair when this one is old or large; delete the oldest where the disk lacks its reserve."""
+        assert self._pair is not None  # noqa: S101  # the caller's condition
+        old = now - self._pair.begun_ns > self._settings.file_minutes * 60e9
+        if old or self._pair.size > LARGEST_SHARE * self._room.size:
+            self._begin_new_pair()
+        elif self._room.is_short(self._settings.directory):
+            self._make_room()
+
+    @property
+    def deletes_early(self) -> bool:
+        """Return whether recordings are deleted although all are within the limit: the disk has less room."""
+        return self._room.deleted_early
 
     def close(self) -> None:
         """Write the indexes and close both files."""
@@ -156,35 +188,47 @@ class Recorder:
         folder.mkdir(parents=True, exist_ok=True)
         self._make_room()
         write_layout(folder)
-        stem = _next_stem(folder, self._now_ns())
-        log = stem.with_suffix(".log").open("x", encoding="ascii")
-        log.writelines(frame_line(frame, self._interface) for frame in self._preamble())
-        mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata, schema)
-        self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), self._monotonic_ns())
-        self.problem = None
+        self._pair, self.problem = self._begin(next_stem(folder, self._now_ns())), None
+
+    def _begin(self, stem: Path) -> _Pair:
+        """Return a new pair. A full disk lets files begin that cannot be written: those are deleted again."""
+        mcap_path, log_path = stem.with_suffix(".mcap"), stem.with_suffix(".log")
+        with ExitStack() as undo:
+            log = log_path.open("x", encoding="ascii")
+            undo.callback(_discard, log, log_path)
+            stream = mcap_path.open("xb")
+            undo.callback(_discard, stream, mcap_path)
+            log.writelines(frame_line(frame, self._interface) for frame in self._preamble())
+            pair = _Pair(McapFile(stream, self._metadata, schema), log, mcap_path, log_path, self._monotonic_ns())
+            pair.flush()
+            undo.pop_all()
+        return pair
 
     def _make_room(self) -> None:
-        """Delete the oldest files until all of them are within the limit and the disk has its reserve."""
-        folder = self._settings.directory
-        limit = self._settings.limit_MB * MEGABYTE
-        files = [(path, path.stat().st_size) for path in _oldest_first(folder)]
-        total = sum(size for _, size in files)
-        for path, size in files:
-            if total <= limit and shutil.disk_usage(folder).free >= RESERVE * limit:
-                return
-            path.unlink()
-            total -= size
+        stays = self._pair.log_path if self._pair else None
+        limit_MB = self._settings.limit_MB
+        room = make_room(self._settings.directory, limit_MB, stays)
+        early = (self._room.deleted_early or room.deleted_early) and room.size < limit_MB * MEGABYTE
+        self._room = replace(room, deleted_early=early)
 
     def _attempt(self, action: Callable[[], object]) -> None:
         """Run an action that writes to the disk; if it fails, close this pair and set `problem`."""
         try:
             action()
         except OSError as error:
-            self.problem = f"{self._settings.directory}: {error.strerror or error}"
+            place = self._settings.directory
+            what, self.remedy = _EXPLAINED.get(error.errno or 0, (error.strerror or str(error), _OTHER_REMEDY))
+            self.problem = f"{place}: {what}"
             self._retry_ns = self._monotonic_ns() + int(RETRY_S * 1e9)
             pair, self._pair = self._pair, None
             if pair:
                 _abandon(pair)
+
+
+def _discard(stream: IO[str] | IO[bytes], path: Path) -> None:
+    with suppress(OSError):
+        stream.close()
+    path.unlink(missing_ok=True)
 
 
 def _abandon(pair: _Pair) -> None:
@@ -193,20 +237,3 @@ def _abandon(pair: _Pair) -> None:
             close()
         except OSError:
             continue  # `problem` already holds the reason
-
-
-def _oldest_first(folder: Path) -> list[Path]:
-    """Return the files of all recordings by their numbers; first those of version 0.1, which have none, by name."""
-    ours = [path for path in folder.glob("rover-*") if path.suffix in {".mcap", ".log"}]
-    return sorted(ours, key=lambda path: (_number(path), path.name))
-
-
-def _number(path: Path) -> int:
-    match = _NUMBERED.fullmatch(path.stem)
-    return int(match[1]) if match else 0
-
-
-def _next_stem(folder: Path, now_ns: int) -> Path:
-    number = 1 + max(map(_number, _oldest_first(folder)), default=0)
-    moment = datetime.fromtimestamp(now_ns // 1_000_000_000, UTC)
-    return folder / f"rover-{moment:%Y%m%dT%H%M%SZ}-{number:06d}"

@@ -10,7 +10,8 @@ from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.candump import open_log, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, as_written_today, estimate_json, snapshot_json
 from regolithd.daemon.recording.digest import Digest
-from regolithd.daemon.recording.mcap_file import read_messages
+from regolithd.daemon.recording.mcap_file import incomplete, read_messages
+from regolithd.daemon.recording.mcap_records import MAGIC
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -26,9 +27,17 @@ BATCH = 256
 """Frames that are processed at a time; the numbers do not depend on it."""
 
 
+class ReplayError(Exception):
+    """There is nothing to replay; the message says why and what to do."""
+
+
 @dataclass(slots=True)
 class Replayed:
-    """The result of a replay: `compared` recorded messages, of which those listed in `different` were not the same."""
+    """The result of a replay: `compared` recorded messages, of which those listed in `different` were not the same.
+
+    `damage` names what was left out of logs and recordings because it cannot be read, and `incomplete` the recordings
+    that end early.
+    """
 
     frames: int = 0
     digest: Digest = field(default_factory=Digest)
@@ -36,6 +45,13 @@ class Replayed:
     undecodable: dict[str, int] = field(default_factory=dict)
     compared: int = 0
     different: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    incomplete: list[str] = field(default_factory=list)
+
+    @property
+    def not_compared(self) -> int:
+        """Messages that the logs give, and that no recording has."""
+        return 2 * self.digest.count - self.compared
 
 
 def replay_logs(
@@ -47,17 +63,32 @@ def replay_logs(
     """Feed the logs through the pipeline in their order, and compare with the MCAP files beside them, if any.
 
     `opening` opens a log; it may show progress.
+
+    Raises
+    ------
+    ReplayError
+        A log holds no frame. An empty one is left out where others hold some.
     """
     result = Replayed()
     chain = Chain(configuration, models)
     recorded: dict[tuple[str, int], dict[str, Any]] = {}
+    empty: list[Path] = []
     for log in logs:
-        recorded |= _recorded(log.with_suffix(".mcap"))
-        for batch in _batches(read_log(log, opening)):
+        recorded |= _recorded(log.with_suffix(".mcap"), result)
+        before, unreadable = result.frames, list[int]()
+        for batch in _batches(read_log(log, opening, unreadable.append)):
             result.frames += len(batch)
             for estimate in chain.feed(batch):
                 result.digest.add(estimate)
                 _compare(estimate, recorded, result)
+        if result.frames == before:
+            empty.append(_without_frames(log))
+        elif unreadable:
+            what = f"{len(unreadable)} lines that cannot be read are left out, the first is line {unreadable[0]}"
+            result.damage.append(f"{log}: {what}.")
+    if empty and not result.frames:
+        raise ReplayError(f"{empty[0]}: it is empty: 0 bytes. Give a candump log with frames.")
+    result.incomplete += [f"{log}: is empty: 0 bytes." for log in empty]
     result.counters = chain.acquisition.counters
     result.undecodable = {str(reason): count for reason, count in chain.decoder.undecodable.items()}
     result.different += [
@@ -66,12 +97,32 @@ def replay_logs(
     return result
 
 
-def _recorded(mcap: Path) -> dict[tuple[str, int], dict[str, Any]]:
+def _without_frames(log: Path) -> Path:
+    """Return the log if it is empty; otherwise say what it is instead.
+
+    Raises
+    ------
+    ReplayError
+        It is not empty.
+    """
+    with log.open("rb") as stream:
+        begin = stream.read(len(MAGIC))
+    if begin == MAGIC:
+        raise ReplayError(f"{log}: this is an MCAP file. Give the candump log beside it: {log.with_suffix('.log')}")
+    if begin:
+        what = "no line of it is that of a candump log, (1436509052.249713) can0 181#3702F8FF00000000"
+        raise ReplayError(f"{log}: {what}. Give a log of the recording, or one of `candump -L`.")
+    return log
+
+
+def _recorded(mcap: Path, result: Replayed) -> dict[tuple[str, int], dict[str, Any]]:
     if not mcap.is_file():
         return {}
+    if text := incomplete(mcap):
+        result.incomplete.append(text)
     return {
         (message.topic, message.content["sequence"]): as_written_today(message.content)
-        for message in read_messages(mcap)
+        for message in read_messages(mcap, on_gap=result.damage.append)
         if message.topic in {SNAPSHOT, ESTIMATE}
     }
 

@@ -15,6 +15,7 @@ import asyncio
 import errno
 import socket
 import struct
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.bus import Bus, BusState
@@ -38,6 +39,8 @@ _GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENETUNREACH)
 _RETRY_FIRST_S = 0.0005
 _RETRY_TOTAL_S = 0.1  # longer than any frame waits on a working bus
 _REOPEN_S = 1.0
+NETWORK_LINKS = Path("/sys/class/net")
+CAN_LINK_TYPE = "280"  # ARPHRD_CAN, if_arp.h
 
 
 class SocketCanBus(Bus):
@@ -167,12 +170,23 @@ def _open_socket(channel: str) -> socket.socket:
         opened.bind((channel,))
     except OSError as error:
         opened.close()
+        if _is_no_can_link(channel):
+            what, remedy = f"cannot open {channel}: it is no CAN link", "Name one that `ip link show type can` lists"
+            raise BusOpenError(what, remedy=f"{remedy}, or `ip link show type vcan`") from error
         raise BusOpenError(
             f"cannot open {channel}: {error.strerror}",
             remedy=f"`ip link show {channel}` must list it; a real one: ip link set {channel} up type can bitrate "
             f"1000000 restart-ms 100; one for tests: ip link add dev {channel} type vcan && ip link set up {channel}",
         ) from error
     return opened
+
+
+def _is_no_can_link(channel: str) -> bool:
+    """Return whether there is a network link of this name, of another type than CAN."""
+    try:
+        return (NETWORK_LINKS / channel / "type").read_text(encoding="ascii").strip() != CAN_LINK_TYPE
+    except OSError:
+        return False
 
 
 def _enlarge(opened: socket.socket) -> None:

@@ -19,7 +19,7 @@ from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
 from regolithd.daemon.simulator.scenario import read_scenario
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
-from regolithd.daemon.wiring import connect_sinks
+from regolithd.daemon.wiring import connect_sinks, open_stores
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.master.network import NodePhase
 from regolithd.drivers.virtual import VirtualRover
@@ -38,7 +38,7 @@ async def main(rover: Path, scenario: Path) -> None:
         asyncio.TaskGroup() as tasks,
     ):
         service = Service(configuration, load_models(configuration))
-        connect_sinks(service)
+        connect_sinks(service, open_stores(service.configuration.mqtt))
         virtual = VirtualRover(world)
         await faults.enter_async_context(fault_socket(virtual, rover.parent / "rover.sock"))
         simulating = tasks.create_task(virtual.run(bus))

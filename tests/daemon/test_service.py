@@ -123,7 +123,7 @@ async def test_a_rover_drives_is_recorded_replayed_and_exported(running: Callabl
 
     assert export([mcap], tmp_path / "out.parquet") == count
     assert pq.read_table(tmp_path / "out.parquet").column_names == list(HEADER)
-    with pytest.raises(ExportError, match=r"Name it \.csv or \.parquet"):
+    with pytest.raises(ExportError, match=r"Name it \.csv, \.parquet or \.nc"):
         export([mcap], tmp_path / "out.xlsx")
 
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from regolithd.daemon import wiring
-from regolithd.daemon.config.configuration import Configuration, Mqtt
+from regolithd.daemon.config.configuration import Configuration, Mqtt, Recording
 from regolithd.daemon.control.server import ControlSink
+from regolithd.daemon.pipeline.onnx_models import load_usable_models
 from regolithd.daemon.publish.mqtt_sink import MqttSink
+from regolithd.daemon.service import Service
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,13 +32,27 @@ def test_the_stores_have_the_limit_in_megabytes(tmp_path: Path) -> None:
 def test_messages_are_kept_in_memory_where_no_store_can_be_opened(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The log says so, and the stores why."""
+    """The stores say why, and so does the log, by the alarm."""
     (tmp_path / "file").touch()
+    configuration = Configuration(
+        mqtt=Mqtt(spool_directory=tmp_path / "file" / "spool"),
+        recording=Recording(directory=tmp_path / "file" / "recordings"),
+    )
+    service = Service(configuration, load_usable_models(configuration))
+    wiring.connect_sinks(service, wiring.open_stores(configuration.mqtt))
+    publishing = service.sinks[0]
+    assert isinstance(publishing, MqttSink)
     with caplog.at_level(logging.WARNING):
-        stores = wiring.open_stores(Mqtt(spool_directory=tmp_path / "file" / "spool"))
-    assert stores.problem
-    assert caplog.messages == [f"{stores.problem} Messages are kept in memory only."]
-    stores.close()
+        publishing._publish_changes()
+    problem = publishing.publisher.store_problem
+    assert f"{tmp_path}/file" in problem
+    assert [record.levelname for record in caplog.records] == ["ERROR", "ERROR"]
+    store, recording = caplog.messages
+    assert store.startswith(f"alarm store: {problem.rstrip('.')}. ")
+    assert "messages are in memory only" in store
+    assert recording.startswith(
+        f"alarm recording: {tmp_path}/file/recordings: it, or a folder above it, is a file. Remove"
+    )
 
 
 @pytest.mark.parametrize(
@@ -59,7 +75,7 @@ def test_the_status_says_what_the_publisher_knows_of_the_broker(
         sinks=[],
         recorder=None,
     )
-    wiring.connect_sinks(service)
+    wiring.connect_sinks(service, wiring.open_stores(service.configuration.mqtt))
     (mqtt,) = (sink for sink in service.sinks if isinstance(sink, MqttSink))
     (control,) = (sink for sink in service.sinks if isinstance(sink, ControlSink))
     assert (control._broker(), control._rover()) == (told, "the network")

@@ -25,7 +25,7 @@ from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
 from regolithd.daemon.simulator.pdo_frames import frames
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
-from regolithd.daemon.wiring import connect_sinks
+from regolithd.daemon.wiring import connect_sinks, open_stores
 from regolithd.drivers.can.bus import Bus
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.canopen import cob_id
@@ -181,7 +181,7 @@ def configuration(folder: Path, rate_Hz: float, port: int) -> Configuration:
 async def _run(configuration: Configuration, bus: LoadedBus, seconds: float) -> tuple[slice, float, float]:
     """Return the SYNCs that count, the share of a core that was used, and the time that the end took [s]."""
     service = LoadedService(configuration, bus)
-    connect_sinks(service)
+    connect_sinks(service, open_stores(service.configuration.mqtt))
     babbling = asyncio.create_task(bus.babble())
     running = asyncio.create_task(service.run())
     await asyncio.sleep(2.0)  # connected, and the buckets of the throttle are empty

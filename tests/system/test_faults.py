@@ -21,7 +21,7 @@ from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
-from regolithd.daemon.wiring import connect_sinks
+from regolithd.daemon.wiring import connect_sinks, open_stores
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.virtual import VirtualRover
 from regolithd.drivers.virtual.fault_injection import COMMANDS
@@ -140,7 +140,7 @@ async def daemon(broker: Mosquitto, tmp_path_factory: pytest.TempPathFactory) ->
         }
     )
     service = Service(configuration, load_models(configuration))
-    connect_sinks(service)
+    connect_sinks(service, open_stores(service.configuration.mqtt))
     rig, ended = Rig(VirtualRover(VirtualWorld()), service), asyncio.Event()
     # One task owns all contexts: pytest begins and ends a fixture in two different ones.
     running = asyncio.ensure_future(run(rig, broker.port, ended))

@@ -4,9 +4,14 @@ import { moment, PLACES, unbroken } from "./format.js";
 
 const KINDS = ["snapshot", "posterior", "odometry", "alarm", "event", "emcy", "node"];
 
-export function showNodes(latest) {
+// The broker retains the message of a node that is configured no longer: it is of an earlier session than the state.
+export function nodesOf(latest) {
   const nodes = Object.entries(latest).filter(([topic]) => topic.startsWith("node/")).map(([, node]) => node);
-  nodes.sort((a, b) => a.node_id - b.node_id);
+  return nodes.filter((node) => !(node.session < latest.state?.session)).sort((a, b) => a.node_id - b.node_id);
+}
+
+export function showNodes(latest) {
+  const nodes = nodesOf(latest);
   replace(content("nodes"), JSON.stringify(nodes.map((node) => [node.node_id, node.phase, node.drive_state, node.text])), () => {
     if (!nodes.length) return [el("p", { class: "none" }, "No node reported yet.")];
     const row = (node) => el("tr", { class: node.phase === "operational" ? "" : "bad" },

@@ -21,7 +21,7 @@ from regolithd.daemon.check.control import check_control, running_daemon
 from regolithd.daemon.check.disk import check_disks, check_folder
 from regolithd.daemon.check.finding import Verdict
 from regolithd.daemon.check.models import check_models, judge_card
-from regolithd.daemon.config.configuration import Bus, Configuration, Control, Estimator, Mqtt, Recording
+from regolithd.daemon.config.configuration import Bus, Configuration, Control, Mqtt, Recording
 from regolithd.daemon.control.client import ControlError
 from regolithd.daemon.control.protocol import NodeLine, Status
 from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
@@ -31,13 +31,14 @@ from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.master.scan import ScanResult
 
 ROOT = Path(__file__).resolve().parents[3]
+CALIBRATED = {"drivetrain": {"no_load_current_A": 0.037}}
 NOW_S = 1_790_000_000.0
 GROUP = grp.getgrgid(os.getgid()).gr_name
 
 
 def check(*options: str) -> subprocess.CompletedProcess[str]:
     """Run `regolithd check` as a command."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "COLUMNS": "200"}
     command = [sys.executable, "-m", "regolithd", "check", *options]
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False, timeout=60)
 
@@ -314,9 +315,14 @@ async def test_a_network_that_does_not_suit_the_rover_is_reported(tmp_path: Path
     """A network for other loads is a warning, a file that is no network is wrong."""
     card = ModelCard("small-1", (Variable("load_N", "N", 1.0, 10.0),), (), 1.0)
     assert judge_card(card, Configuration()).verdict is Verdict.WARNING
-    (tmp_path / "broken.onnx").write_bytes(b"no network")
-    finding, _ = await check_models(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
-    assert finding.verdict is Verdict.WRONG
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(b"no network")
+    both = Configuration.model_validate({"estimator": {"model": broken}, "posterior": {"model": broken}} | CALIBRATED)
+    found = await check_models(both)
+    assert [(each.subject, each.verdict) for each in found] == [
+        ("model", Verdict.WRONG),
+        ("posterior", Verdict.WRONG),
+    ]
     finding, _ = await check_models(Configuration())
     assert finding.verdict is Verdict.GOOD
 
@@ -330,6 +336,11 @@ async def test_who_may_command_is_reported(tmp_path: Path) -> None:
     assert check_control(configuration, status("operational"))[0].verdict is Verdict.GOOD
     (finding,) = check_control(configuration, ControlError("No permission to open it. Join the group.", 77))
     assert (finding.verdict, finding.remedy) == (Verdict.WARNING, "Join the group.")
+
+    configuration.control.socket.touch()
+    (finding,) = check_control(configuration, await running_daemon(configuration))
+    assert (finding.verdict, finding.text) == (Verdict.WRONG, f"{configuration.control.socket} is not a socket")
+    configuration.control.socket.unlink()
 
     silent = await asyncio.start_unix_server(lambda _, writer: writer.close(), configuration.control.socket)
     async with silent:
@@ -380,19 +391,3 @@ async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_know
     for verdict, configuration in cases.items():
         _, finding = await check_models(configuration)
         assert (finding.subject, finding.verdict) == ("posterior", verdict)
-
-
-async def test_two_models_that_cannot_be_used_are_two_findings(tmp_path: Path) -> None:
-    """A terrain network that cannot be read does not hide what is wrong with the posterior's."""
-    (tmp_path / "empty.onnx").touch()
-    tables = {
-        "drivetrain": {"no_load_current_A": 0.037},
-        "estimator": {"model": tmp_path / "absent.onnx"},
-        "posterior": {"model": tmp_path / "empty.onnx"},
-    }
-    found = await check_models(Configuration.model_validate(tables))
-    assert [(each.subject, each.verdict) for each in found] == [
-        ("model", Verdict.WRONG),
-        ("posterior", Verdict.WRONG),
-    ]
-    assert ["absent.onnx" in found[0].text, "empty.onnx" in found[1].text] == [True, True]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, get_type_hints
@@ -346,6 +347,31 @@ def test_a_bench_fault_without_a_bench_is_an_error(tmp_path: Path) -> None:
     done = regolithd("bench-fault", "off", "3", "--control", tmp_path / "none.sock")
     assert done.exit_code == 1
     assert done.stdout.startswith("error: ")
+
+
+def test_a_number_that_is_not_finite_is_refused() -> None:
+    """Every option that is a number says so, with status 2: Python reads `nan` and `inf` as numbers."""
+    found = 0
+    group: Any = typer.main.get_command(app)
+    calibrate = {("calibrate", name): each for name, each in group.commands["calibrate"].commands.items()}
+    for path, command in ({(name,): each for name, each in group.commands.items()} | calibrate).items():
+        for option in (each for each in command.params if each.bare_type() == "float"):
+            for number in ("nan", "inf"):
+                done = regolithd(*path, f"{option.opts[0]}={number}")
+                assert done.exit_code == 2, (path, option.name)
+                assert re.search("is not finite|be (less|greater) than", done.output)
+            found += 1
+    assert found >= 8
+
+
+@pytest.mark.parametrize("place", ["afile", "afile/folder"])
+def test_schemas_that_cannot_be_written_are_one_message(tmp_path: Path, place: str) -> None:
+    """A file in the folder's place, or above it."""
+    (tmp_path / "afile").touch()
+    done = regolithd("schema", "--write", tmp_path / place)
+    assert done.exit_code == 1
+    assert done.stderr.startswith(f"{tmp_path / place}: ")
+    assert done.stderr.endswith("Name a folder that can be written with --write.\n")
 
 
 def test_every_command_has_a_help_text() -> None:

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from regolithd.daemon.publish.stores import Stores
+
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
-def test_the_daemon_ends_with_status_0_when_it_is_asked_to(tmp_path: Path, end: signal.Signals) -> None:
-    """systemd, or a person with Ctrl-C, asks; another status would be a failure."""
-    config = tmp_path / "rover.toml"
-    config.write_text(
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    """A rover.toml with everything in a folder of its own."""
+    path = tmp_path / "rover.toml"
+    path.write_text(
         f"""[bus]
 interface = "virtual"
 [recording]
@@ -29,6 +31,12 @@ spool_directory = "{tmp_path / "spool"}"
 socket = "{tmp_path / "control.sock"}"
 """
     )
+    return path
+
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
+def test_the_daemon_ends_with_status_0_when_it_is_asked_to(config: Path, end: signal.Signals) -> None:
+    """systemd, or a person with Ctrl-C, asks; another status would be a failure."""
     line = [sys.executable, "-m", "regolithd", "run", "--config", str(config)]
     with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as process:
         try:
@@ -38,3 +46,16 @@ socket = "{tmp_path / "control.sock"}"
             assert process.wait(60) == 0
         finally:
             process.kill()
+
+
+def test_a_second_daemon_is_refused_and_leaves_no_file(config: Path) -> None:
+    """An empty recording would be the newest, which `monitor --follow` and `export` take."""
+    folder = config.parent
+    stores = Stores.open(folder / "spool", 10_000_000)
+    before = set(folder.rglob("*"))
+    line = [sys.executable, "-m", "regolithd", "run", "--config", str(config)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
+    stores.close()
+    assert done.returncode == 1
+    assert done.stderr == f"{folder}/spool: another regolithd uses it. Stop that process first.\n"
+    assert set(folder.rglob("*")) == before

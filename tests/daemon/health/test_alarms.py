@@ -32,6 +32,7 @@ TROUBLES = [
     ("store_damaged", 1, "store", Severity.ERROR),
     ("store_torn", 1, "store", Severity.WARNING),
     ("recording_problem", "no room", "recording", Severity.ERROR),
+    ("recording_short", True, "recording", Severity.WARNING),
     ("control_problem", "no such group", "control", Severity.WARNING),
     ("wheel_problem", "wheel 3 (node 3) at 0.000", "wheel", Severity.ERROR),
     ("broker_problem", "connection refused", "broker", Severity.WARNING),
@@ -51,7 +52,8 @@ def test_all_is_well() -> None:
 @pytest.mark.parametrize(("fact", "value", "name", "severity"), TROUBLES)
 def test_each_trouble_is_one_alarm_with_its_remedy(fact: str, value: object, name: str, severity: Severity) -> None:
     """Each problem gives one alarm, with severity, text and remedy, under a name from `alarm_names`."""
-    alarms = current_alarms(dataclasses.replace(AlarmInputs(), **{fact: value}))
+    inputs = AlarmInputs(recording_remedy="Free space.")
+    alarms = current_alarms(dataclasses.replace(inputs, **{fact: value}))
     assert list(alarms) == [name]
     assert alarms[name].severity is severity
     assert alarms[name].text

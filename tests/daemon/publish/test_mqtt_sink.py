@@ -47,6 +47,7 @@ class Recorder:
     report: PublishingReport = NO_MESSAGES
     store_problem: str = ""
     problem: str = ""
+    recent_problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
     def publish(self, topic: str, message: type, *, time_ns: int, **fields: Any) -> None:
@@ -91,12 +92,14 @@ def test_an_alarm_is_published_when_it_begins_changes_and_ends_and_not_between(s
     for problem in ("no such device", "no such device", "permission denied", "", ""):
         service.bus_problem = problem
         sink._publish_changes()
-    published = [(topic, fields["active"], fields["text"]) for topic, fields in publisher.taken()]
-    assert published == [
+    taken = publisher.taken()
+    assert [(topic, fields["active"], fields["text"]) for topic, fields in taken] == [
         ("alarm/bus", True, "no such device"),
         ("alarm/bus", True, "permission denied"),
         ("alarm/bus", False, "permission denied"),
     ]
+    began, changed, ended = (fields["since"] for _, fields in taken)
+    assert began == changed < ended
 
 
 def test_a_soil_change_has_its_evidence_as_numbers_also_after_its_end(service: Any) -> None:

@@ -224,7 +224,10 @@ async def test_the_retained_state_of_a_node_is_its_newest_also_after_an_outage(
     [
         ({"host": "broker.invalid"}, "the name cannot be resolved. Correct [mqtt] host"),
         ({}, "connection refused"),
-        ({"password_file": Path("/nowhere/password"), "username": "me"}, "/nowhere/password"),
+        (
+            {"password_file": Path("/nowhere/password"), "username": "me"},
+            "/nowhere/password is not there. Write it, or correct [mqtt] password_file",
+        ),
     ],
 )
 async def test_a_broker_that_cannot_be_reached_is_reported_once(

@@ -48,6 +48,7 @@ class Publisher:
     session: str = "20261122T000000Z-aaaa"
     connected: bool = False
     problem: str = ""
+    recent_problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
     def publish(self, topic: str, message: type, *, time_ns: int = T_NS, **fields: Any) -> None:
@@ -90,7 +91,9 @@ def service(clock: Clock, tmp_path: Path) -> Any:
     return SimpleNamespace(
         configuration=configuration,
         network=network,
-        recorder=SimpleNamespace(paths=(tmp_path / "a.mcap", tmp_path / "a.log"), problem=None),
+        recorder=SimpleNamespace(
+            paths=(tmp_path / "a.mcap", tmp_path / "a.log"), problem=None, remedy="", deletes_early=True
+        ),
         bus_problem="",
         models=SimpleNamespace(problem=""),
         chain=SimpleNamespace(acquisition=Acquisition((), (), 1)),
@@ -198,7 +201,7 @@ def test_a_recording_without_a_file_or_a_disk_is_reported(service: Any, clock: C
 def test_alarm_inputs_come_from_every_part(service: Any, clock: Clock) -> None:
     """Also from the publisher's report and from the control socket."""
     report = REPORT.model_copy(update={"dropped": 1, "unstored": 2, "damaged": 3, "torn": 4})
-    service.recorder.problem = "no room"
+    service.recorder.problem, service.recorder.remedy = "no room", "free some"
     sink = MqttSink(
         service,
         Publisher(report),  # type: ignore[arg-type]
@@ -209,10 +212,12 @@ def test_alarm_inputs_come_from_every_part(service: Any, clock: Clock) -> None:
     found = sink._alarm_inputs()
     assert (found.store_dropped, found.store_unstored, found.store_damaged, found.store_torn) == (1, 2, 3, 4)
     assert (found.bus_state, found.kernel_drops, found.bus_problem) == (BusState.PASSIVE, 4, "")
-    assert (found.recording_problem, found.control_problem, found.wheel_problem) == ("no room", "no group", "wheel 3")
+    assert (found.recording_problem, found.recording_remedy, found.recording_short) == ("no room", "free some", True)
+    assert (found.control_problem, found.wheel_problem) == ("no group", "wheel 3")
     service.network = service.recorder = None
     empty = sink._alarm_inputs()
     assert (empty.bus_state, empty.kernel_drops, empty.recording_problem, empty.nodes) == (BusState.ACTIVE, 0, "", {})
+    assert (empty.recording_remedy, empty.recording_short) == ("", False)
 
 
 async def test_frames_that_cannot_be_decoded_are_an_alarm_when_they_last(service: Any, clock: Clock) -> None:
@@ -230,7 +235,7 @@ async def test_frames_that_cannot_be_decoded_are_an_alarm_when_they_last(service
 
 async def test_a_broker_that_stays_away_is_an_alarm(service: Any, clock: Clock) -> None:
     """The reason is told after ten seconds, until there is a connection again."""
-    publisher = Publisher(problem="the password file is not UTF-8")
+    publisher = Publisher(problem="the password file is not UTF-8", recent_problem="the password file is not UTF-8")
     sink = MqttSink(service, publisher, monotonic_ns=clock)  # type: ignore[arg-type]
     clock.now_s += 9.0
     sink._note_lasting_problems()
@@ -240,6 +245,22 @@ async def test_a_broker_that_stays_away_is_an_alarm(service: Any, clock: Clock) 
     publisher.problem = ""
     sink._note_lasting_problems()
     publisher.problem = "no answer"
+    assert sink._alarm_inputs().broker_problem == ""
+
+
+async def test_a_broker_that_is_lost_again_and_again_is_an_alarm(service: Any, clock: Clock) -> None:
+    """The reason is told after fifteen seconds, while connected as well, until a connection has lasted."""
+    publisher = Publisher()
+    sink = MqttSink(service, publisher, monotonic_ns=clock)  # type: ignore[arg-type]
+    publisher.recent_problem = "taken over"
+    for second in range(1, 20):
+        clock.now_s += 1.0
+        publisher.problem = "taken over" if second % 2 else ""
+        sink._note_lasting_problems()
+        assert sink._alarm_inputs().broker_problem == ("taken over" if second > 15 else ""), second
+    publisher.problem = publisher.recent_problem = ""
+    sink._note_lasting_problems()
+    publisher.recent_problem = "taken over"
     assert sink._alarm_inputs().broker_problem == ""
 
 

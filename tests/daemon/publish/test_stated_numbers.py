@@ -15,7 +15,7 @@ NUMBERS = {
         "_NOT_AUTHORIZED": 0x87,
         "_QUOTA_EXCEEDED": 0x97,
     },
-    "connection_errors": {"_CREDENTIALS_CODES": (4, 5, 0x86, 0x87), "_SESSION_TAKEN_OVER": 0x8E},
+    "connection_errors": {"_CREDENTIALS_CODES": (0x86, 0x87), "_SESSION_TAKEN_OVER": 0x8E},
     "connection": {
         "WINDOW": 64,
         "OTHERS_WINDOW": 16,

@@ -113,6 +113,8 @@ async def test_a_rover_with_a_certificate_delivers(
         publisher.estimate(estimate())
         await until(lambda: publisher.report.acknowledged == 1)
     assert "u'kapvik'" in broker.log
+    (finding,) = await check_broker(configuration)
+    assert f"accepts the holder of {issued.kapvik.path}, TLS" in finding.text
 
 
 @pytest.mark.parametrize(
@@ -216,13 +218,16 @@ async def test_a_rover_with_the_certificate_of_another_loses_nothing(
         assert publisher.report.queued == 1
 
 
-async def test_check_and_ground_say_the_same(start: Callable[[str], Mosquitto], issued: Issued, tmp_path: Path) -> None:
-    """A missing client certificate, in `regolithd check` and on the ground."""
+async def test_check_and_ground_say_the_same(
+    start: Callable[[str], Mosquitto], issued: Issued, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A missing client certificate, in `regolithd check` and on the ground; the library logs nothing beside it."""
     settings = mqtt(start(secured(issued.ours, issued.broker)), issued, None)
     (finding,) = await check_broker(Configuration(mqtt=Mqtt(spool_directory=tmp_path, **settings)))
     assert finding.verdict == "wrong"
     assert "requires a client certificate" in finding.text
     assert finding.remedy.startswith("Set [mqtt] cert_file")
+    assert caplog.messages == []
     subscription = Subscription(Broker(**settings), lambda _: None)
     async with running(subscription):
         await until(lambda: "requires a client certificate" in subscription.problem)
@@ -235,11 +240,12 @@ async def test_check_names_the_certificate_that_is_accepted(
     settings = mqtt(start(secured(issued.ours, issued.broker)), issued, issued.kapvik)
     (finding,) = await check_broker(Configuration(mqtt=Mqtt(spool_directory=tmp_path, **settings)))
     assert finding.verdict == "good"
-    assert f"accepts the client of {issued.kapvik.path}, TLS" in finding.text
+    assert f"accepts the holder of {issued.kapvik.path}, TLS" in finding.text
 
 
 FILES = {
-    "absent ca_file": ({"ca_file": "absent.pem"}, "absent.pem"),
+    "absent ca_file": ({"ca_file": "absent.pem"}, "absent.pem is not there. Write it, or correct [mqtt] ca_file"),
+    "a folder as cert_file": ({"cert_file": "."}, "is a folder. Name a file in [mqtt] cert_file"),
     "empty ca_file": ({"ca_file": "empty.pem"}, "empty.pem holds no certificate"),
     "not of the same pair": ({"key_file": "other.key"}, "is not the private key of"),
     "no key": ({"key_file": "empty.pem"}, "holds no certificate and key in PEM"),
@@ -259,4 +265,4 @@ async def test_a_file_that_cannot_be_used_is_named(case: str, issued: Issued, tm
     settings = {"tls": True} | valid | {key: tmp_path / name for key, name in changed.items()}
     found = await problem(tmp_path, settings)
     assert text in found
-    assert "[mqtt]" in found or "No such file" in found
+    assert "[mqtt]" in found

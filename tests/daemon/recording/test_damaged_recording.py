@@ -179,7 +179,7 @@ def test_other_commands_end_with_one_message(tmp_path: Path, command: str, make_
     write(path)
     damage_second_chunk(path)
     log = tmp_path / "a.log"
-    log.write_text("")
+    log.write_text("(1.000000) can0 080# T\n")
     simulation = Path(__file__).parents[3] / "docs/examples/husky/SIM.toml"
     arguments = {
         "replay": ["replay", str(log), "--model", str(make_network())],

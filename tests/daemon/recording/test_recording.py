@@ -22,8 +22,9 @@ from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, six, snapshot_from_json
 from regolithd.daemon.recording.digest import Digest, _flattened
 from regolithd.daemon.recording.mcap_file import McapFile, read_messages, read_metadata
-from regolithd.daemon.recording.recorder import Recorder, _next_stem, _oldest_first
+from regolithd.daemon.recording.recorder import Recorder
 from regolithd.daemon.recording.replay import replay_logs
+from regolithd.daemon.recording.ring import next_stem, oldest_first
 from regolithd.drivers.can.frame import Frame
 
 FRAMES = st.builds(
@@ -181,7 +182,7 @@ def test_a_disk_that_others_fill_costs_old_recordings_first(
     before = sorted(tmp_path.glob("rover-*"), key=lambda path: (path.stat().st_mtime_ns, path.name))
     assert len(before) == 6
     monkeypatch.setattr(
-        "regolithd.daemon.recording.recorder.shutil.disk_usage",
+        "regolithd.daemon.recording.ring.shutil.disk_usage",
         lambda folder: shutil._ntuple_diskusage(0, 0, 10**9 if len(list(folder.glob("rover-*"))) <= 4 else 0),
     )
     record(3)
@@ -249,7 +250,7 @@ def test_the_oldest_files_go_first_whatever_the_clock_says(
         os.utime(mcap, ns=(now_ns, now_ns))
         os.utime(log, ns=(now_ns, now_ns))
         written += [log, mcap]
-    assert _oldest_first(folder) == written
+    assert oldest_first(folder) == written
 
 
 def recorder_paths(folder: Path, known: list[Path]) -> list[Path]:
@@ -322,7 +323,7 @@ def test_the_digest_refuses_a_value_that_it_cannot_encode() -> None:
 
 def test_a_recording_is_named_after_the_second_it_began_in(tmp_path: Path) -> None:
     """Cut off, not rounded, and numbered after the highest number that is there."""
-    assert _next_stem(tmp_path, 1_370_959_642_999_999_999).name == "rover-20130611T140722Z-000001"
+    assert next_stem(tmp_path, 1_370_959_642_999_999_999).name == "rover-20130611T140722Z-000001"
     for name in ("rover-20130611T140722Z-000041.mcap", "rover-20200101T000000Z-000007.log", "rover-old.mcap"):
         (tmp_path / name).touch()
-    assert _next_stem(tmp_path, 1_370_959_642_000_000_000).name == "rover-20130611T140722Z-000042"
+    assert next_stem(tmp_path, 1_370_959_642_000_000_000).name == "rover-20130611T140722Z-000042"

@@ -10,7 +10,8 @@ import socket
 from stated_numbers import differing
 
 NUMBERS = {
-    "recorder": {"FLUSH_S": 0.4, "RETRY_S": 10, "MEGABYTE": 10**6, "RESERVE": 0.05},
+    "recorder": {"FLUSH_S": 0.4, "RETRY_S": 10},
+    "ring": {"MEGABYTE": 10**6, "RESERVE": 0.05, "LARGEST_SHARE": 0.1},
     "candump": {"ERROR_FLAG": socket.CAN_ERR_FLAG},
     "mcap_records": {"_LONGEST": 64e6, "_LONGEST_INCOMPLETE": 4e6},
 }

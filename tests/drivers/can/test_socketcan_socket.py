@@ -339,13 +339,17 @@ def test_the_socket_has_times_drops_own_frames_and_errors(
 
 
 def test_a_link_that_is_not_there_is_named_and_its_socket_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the commands that make it; a kernel without SocketCAN is told apart."""
+    """With the commands that make it; a link of another type and a kernel without SocketCAN are told apart."""
     made = Options()
     made.refused = ("bind",)
     monkeypatch.setattr(socketcan.socket, "socket", lambda *_: made)
     with pytest.raises(BusOpenError, match=r"^cannot open can7: No such device.*ip link add dev can7 type vcan"):
         socketcan._open_socket("can7")
     assert made.closed
+    with pytest.raises(
+        BusOpenError, match=r"^cannot open lo: it is no CAN link. Name one that `ip link show type can`"
+    ):
+        socketcan._open_socket("lo")
 
     def none(*_: int) -> None:
         raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")

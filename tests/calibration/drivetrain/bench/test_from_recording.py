@@ -129,6 +129,13 @@ def test_a_recording_without_weights_is_an_error_that_names_the_column(spin: Pat
     assert "weight_kg" in done.stderr
 
 
+def test_a_configuration_that_is_not_there_is_named_with_what_to_give(spin: Path, tmp_path: Path) -> None:
+    """The default is `rover.toml` of the working folder, which is seldom meant."""
+    done = calibrate("wheels-up", spin, "--config", tmp_path / "rover.toml")
+    assert done.returncode == 1
+    assert done.stderr == f"{tmp_path}/rover.toml: there is no such file. Name the rover's rover.toml with --config.\n"
+
+
 def test_the_daemon_corrects_loads_by_zero_and_span() -> None:
     """A load cell with a zero of 2 N and a span of 1.1 is corrected before the smoothing."""
     cells = LoadCells(zero_N=2.0, span=1.1)  # type: ignore[arg-type]  # one value for six wheels
