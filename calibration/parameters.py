@@ -10,12 +10,26 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidatorFunctionWrapHandler, field_validator
+from pydantic_core import PydanticCustomError
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Efficiency = Annotated[float, Field(gt=0, le=1)]
+# Ranges that no small rover and no bench leaves, and that a value in another unit (mm, g, mA) does.
+Length = Annotated[float, Field(ge=0.05, le=5.0)]
+WheelSize = Annotated[float, Field(ge=0.005, le=0.5)]
+Mass = Annotated[float, Field(ge=0.1, le=1000.0)]
+Current = Annotated[float, Field(strict=True, ge=0.0, le=5.0)]
+ViscousCurrent = Annotated[float, Field(strict=True, ge=0.0, le=0.1)]
+TorqueConstant = Annotated[float, Field(ge=0.0005, le=2.0)]
+Ratio = Annotated[float, Field(ge=0.01, le=10_000.0)]
+Factor = Annotated[float, Field(strict=True, ge=0.01, le=100.0)]
+Share = Annotated[float, Field(strict=True, ge=0.0, le=10.0)]
+Force = Annotated[float, Field(strict=True, ge=-10_000.0, le=10_000.0)]
+ForceStd = Annotated[float, Field(strict=True, ge=0.0, le=10_000.0)]
+LoadLoss = Annotated[float, Field(strict=True, ge=-10.0, le=10.0)]
 
 GRAVITY_M_S2 = 9.80665
 """Standard acceleration of gravity g_n (3rd CGPM, 1901)."""
@@ -29,14 +43,49 @@ def _one_or_six(value: object) -> object:
 SixNotNegative = Annotated[
     tuple[NotNegative, NotNegative, NotNegative, NotNegative, NotNegative, NotNegative], BeforeValidator(_one_or_six)
 ]
-SixNumbers = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_one_or_six)]
-SixPositive = Annotated[tuple[Positive, Positive, Positive, Positive, Positive, Positive], BeforeValidator(_one_or_six)]
+SixCurrents = Annotated[tuple[Current, Current, Current, Current, Current, Current], BeforeValidator(_one_or_six)]
+SixViscousCurrents = Annotated[
+    tuple[ViscousCurrent, ViscousCurrent, ViscousCurrent, ViscousCurrent, ViscousCurrent, ViscousCurrent],
+    BeforeValidator(_one_or_six),
+]
+SixFactors = Annotated[tuple[Factor, Factor, Factor, Factor, Factor, Factor], BeforeValidator(_one_or_six)]
+SixShares = Annotated[tuple[Share, Share, Share, Share, Share, Share], BeforeValidator(_one_or_six)]
+SixForces = Annotated[tuple[Force, Force, Force, Force, Force, Force], BeforeValidator(_one_or_six)]
+SixForceStds = Annotated[
+    tuple[ForceStd, ForceStd, ForceStd, ForceStd, ForceStd, ForceStd], BeforeValidator(_one_or_six)
+]
+SixLoadLosses = Annotated[
+    tuple[LoadLoss, LoadLoss, LoadLoss, LoadLoss, LoadLoss, LoadLoss], BeforeValidator(_one_or_six)
+]
+
+
+def _kind_expected(given: object, taken: object) -> str:
+    """Return what should have been given, where pydantic took a text or a truth value for a number, or the reverse."""
+    if isinstance(taken, dict):
+        values = given.values() if isinstance(given, dict) else ()
+        return next(filter(None, map(_kind_expected, values, taken.values())), "")
+    if isinstance(taken, tuple | list):
+        each = given if isinstance(given, tuple | list) else (given,)
+        return next(filter(None, map(_kind_expected, each, taken)), "")
+    if isinstance(taken, bool):
+        return "" if isinstance(given, bool) else "true or false"
+    is_number = isinstance(taken, int | float) and not isinstance(taken, str)
+    return "a number" if is_number and isinstance(given, bool | str | bytes) else ""
 
 
 class Table(BaseModel):
     """A TOML table: unknown keys are errors, and the fields cannot be assigned."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @field_validator("*", mode="wrap")
+    @classmethod
+    def _as_written(cls, value: object, take: ValidatorFunctionWrapHandler) -> object:
+        """Convert no text and no truth value to a number, and no number to a truth value."""
+        taken = take(value)
+        if kind := _kind_expected(value, taken):
+            raise PydanticCustomError("as_written", kind)
+        return taken
 
 
 class Drivetrain(Table):
@@ -53,20 +102,20 @@ class Drivetrain(Table):
     | `load_loss_per_Nm` | λ | relative increase of the current per torque | `regolithd calibrate brake` |
     """
 
-    torque_constant_Nm_per_A: Positive = 0.0234
-    planetary_ratio: Positive = 14.0
+    torque_constant_Nm_per_A: TorqueConstant = 0.0234
+    planetary_ratio: Ratio = 14.0
     planetary_efficiency: Efficiency = 0.70
-    harmonic_ratio: Positive = 100.0
+    harmonic_ratio: Ratio = 100.0
     harmonic_efficiency: Efficiency = 0.70
-    gain_relative_std: NotNegative = 0.0
-    no_load_current_A: SixNotNegative = (0.0,) * 6
-    no_load_current_std_A: SixNotNegative = (0.0,) * 6
-    viscous_current_A_s_per_rad: SixNotNegative = (0.0,) * 6
-    viscous_current_std_A_s_per_rad: SixNotNegative = (0.0,) * 6
-    gain_factor: SixPositive = (1.0,) * 6
-    gain_factor_std: SixNotNegative = (0.0,) * 6
-    load_loss_per_Nm: SixNumbers = (0.0,) * 6
-    load_loss_std_per_Nm: SixNotNegative = (0.0,) * 6
+    gain_relative_std: Share = 0.0
+    no_load_current_A: SixCurrents = (0.0,) * 6
+    no_load_current_std_A: SixCurrents = (0.0,) * 6
+    viscous_current_A_s_per_rad: SixViscousCurrents = (0.0,) * 6
+    viscous_current_std_A_s_per_rad: SixViscousCurrents = (0.0,) * 6
+    gain_factor: SixFactors = (1.0,) * 6
+    gain_factor_std: SixShares = (0.0,) * 6
+    load_loss_per_Nm: SixLoadLosses = (0.0,) * 6
+    load_loss_std_per_Nm: SixShares = (0.0,) * 6
 
     @property
     def ratio(self) -> float:
@@ -82,26 +131,26 @@ class Drivetrain(Table):
 class LoadCells(Table):
     """Calibration of the load cells: load = `span` × (reading − `zero_N`); six values, or one for all."""
 
-    zero_N: SixNumbers = (0.0,) * 6
-    zero_std_N: SixNotNegative = (0.0,) * 6
-    span: SixPositive = (1.0,) * 6
-    span_std: SixNotNegative = (0.0,) * 6
+    zero_N: SixForces = (0.0,) * 6
+    zero_std_N: SixForceStds = (0.0,) * 6
+    span: SixFactors = (1.0,) * 6
+    span_std: SixShares = (0.0,) * 6
 
 
 class Wheel(Table):
     """A rigid wheel without grousers."""
 
-    radius_m: Positive = 0.075
-    radius_std_m: NotNegative = 0.0
-    width_m: Positive = 0.07
+    radius_m: WheelSize = 0.075
+    radius_std_m: Annotated[float, Field(ge=0.0, le=0.1)] = 0.0
+    width_m: WheelSize = 0.07
 
 
 class Rover(Table):
     """Mass and geometry of the rover's body."""
 
-    mass_kg: Positive = 30.0
-    wheelbase_m: Positive = 0.65
-    track_m: Positive = 0.55
+    mass_kg: Mass = 30.0
+    wheelbase_m: Length = 0.65
+    track_m: Length = 0.55
 
 
 class Soil(Table):

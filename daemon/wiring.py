@@ -36,7 +36,12 @@ def connect_sinks(service: Service, stores: Stores) -> None:
         beat=lambda: liveness.beat(CONTROL),
     )
     liveness.expect(CONTROL, CONTROL_TIMEOUT_S)
-    publishing = MqttSink(service, publisher, control_problem=lambda: control.problem)
+    publishing = MqttSink(
+        service,
+        publisher,
+        control_problem=lambda: control.problem,
+        wheel_problem=lambda: control.wheel_problem,
+    )
     metrics = MetricsSink(configuration.control.socket.with_name(METRICS), publishing.metrics)
     service.sinks += [publishing, control, metrics]
 

@@ -129,7 +129,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         ),
         *("Decided", "_Search", "Start"),
         "AsRead",
-        *("_BetweenReadings", "MarkovChains", "SwitchingMean"),
+        *("BetweenReadings", "Reliability", "MarkovChains", "SwitchingMean"),
         *("Gains", "JointPosterior", "Likelihood", "_Likelihood", "Drawn", "Information", "Apart", "KnownTogether"),
         *("NormalTruths", "NormalTruth", "MixingDensity", "Windows", "JumpChain", "Estimate", "Combination"),
         *("Batch", "Left", "_Equations", "OtherStatement", "_Release"),

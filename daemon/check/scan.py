@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.canopen.emcy import error_text, register_bits
-from regolithd.drivers.master.identity import compare_identity
+from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.registry import DEVICES
+from regolithd.drivers.master.identity import compare_identity, unchecked
 from regolithd.drivers.master.survey import Survey
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.devices.device import Device
     from regolithd.drivers.master.events import Identity
     from regolithd.drivers.master.survey import FoundNode
 
@@ -98,13 +100,29 @@ def _needs(found: FoundNode, node: NodeDescription | None, *, known: bool) -> st
     if node is not None:
         difference = compare_identity(node, found.identity)
         return "as configured" if difference is None else difference[1]
-    _, key, profile = _PROFILES.get(found.profile_number or 0, ("", "", ""))
     absent = "not in [nodes]. " if known else ""
+    if own := _expected_without_devices(found):
+        return f"{absent}It would need its id in [nodes] {own.configuration_key}"
+    _, key, profile = _PROFILES.get(found.profile_number or 0, ("", "", ""))
     if not key:
         return f"{absent}No profile of regolithd fits: describe its objects in [devices.{found.node_id}]"
     chosen = _own_profile(found.identity) or profile
     of_profile = f' and [devices.{found.node_id}] profile = "{chosen}"' if chosen else ""
     return f"{absent}It would need its id in [nodes] {key}{of_profile}"
+
+
+def _expected_without_devices(found: FoundNode) -> Device | None:
+    """Return the device that comes with regolithd and has this identity: it needs no `[devices]`."""
+    return next(
+        (
+            device
+            for device in DEVICES
+            if found.identity is not None
+            and not unchecked(device)
+            and compare_identity(NodeDescription(found.node_id, device, None), found.identity) is None
+        ),
+        None,
+    )
 
 
 def _own_profile(identity: Identity) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from pydantic import ValidationError
 
 from regolithd.daemon.terminal import HELP_MARKUP, finite
 
@@ -104,12 +105,17 @@ def _finish(fit: Callable[[], ConfigurationUpdate], config: Path, write: bool) -
     """Fit, print the results, and write them unless `write` is false."""
     from regolithd.calibration.drivetrain.bench.line_fit import BenchError
     from regolithd.calibration.mismatch.errors import RecordingError
+    from regolithd.daemon.setup import configuration_or_exit
 
     if not config.is_file():
         typer.echo(f"{config}: there is no such file. Name the rover's rover.toml with --config.", err=True)
         raise typer.Exit(1)
     try:
         update = fit()
+    except ValidationError as error:
+        configuration_or_exit(config)  # says what is wrong in rover.toml, if it is that file
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from error
     except (BenchError, RecordingError, OSError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error

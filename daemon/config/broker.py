@@ -2,16 +2,37 @@
 
 from __future__ import annotations
 
+import re
 import stat
+from contextlib import suppress
+from ipaddress import ip_address
 from pathlib import Path  # noqa: TC003  # pydantic reads it at run time
 from typing import TYPE_CHECKING, Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from regolithd.calibration.parameters import Table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+
+_ADDRESS = re.compile(r"(?:(?P<scheme>[a-z]+)://)?(?P<host>[^/:\s]*)(?::(?P<port>\d+))?/?", re.IGNORECASE)
+
+
+def _host(text: str) -> str:
+    """Return a host's name or address; one with a scheme or a port is refused, with the keys that have them."""
+    with suppress(ValueError):
+        ip_address(text)
+        return text
+    match = _ADDRESS.fullmatch(text)
+    if match is None:
+        raise ValueError("a name or an address, such as rover.local or 10.0.0.2")
+    if match["scheme"] is None and match["port"] is None and not text.endswith("/"):
+        return text
+    keys = f'host = "{match["host"]}"' + (f", port = {match['port']}" if match["port"] else "")
+    secure = (match["scheme"] or "").lower() in {"mqtts", "ssl", "tls"}
+    raise ValueError(f"a name or an address alone: {keys}{', tls = true' if secure else ''}")
 
 
 class BrokerSettings(Table):
@@ -23,9 +44,12 @@ class BrokerSettings(Table):
     """
 
     socket: Path | None = None
-    host: Annotated[str, Field(min_length=1)] = "localhost"
+    host: Annotated[str, Field(min_length=1), AfterValidator(_host)] = "localhost"
     port: Annotated[int, Field(ge=1, le=65_535)] = 1883
-    prefix: Annotated[str, Field(pattern=r"^[^#+\s]*[^#+/\s]$")] = "regolith"
+    prefix: Annotated[
+        str,
+        Field(pattern=r"^[^#+\s]*[^#+/\s]$", description="topic levels with / between them, without #, + and spaces"),
+    ] = "regolith"
     username: str | None = None
     password_file: Path | None = None
     tls: bool = False

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, create_model
 
-from regolithd.calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table, Wheel
+from regolithd.calibration.parameters import Drivetrain, Length, LoadCells, Mass, Ratio, Rover, Table, Wheel
 from regolithd.daemon.config.broker import BrokerSettings
 from regolithd.daemon.config.devices import DeviceTable  # noqa: TC001  # pydantic reads it at run time
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
@@ -36,10 +36,12 @@ MASTER_NODE = 127
 class Identity(Table):
     """`[rover]`: name, mass and dimensions."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "kapvik"
-    mass_kg: Positive = 30.0
-    wheelbase_m: Positive = 0.65
-    track_m: Positive = 0.55
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$", description="letters, digits, _ and -, 1 to 64")] = (
+        "kapvik"
+    )
+    mass_kg: Mass = 30.0
+    wheelbase_m: Length = 0.65
+    track_m: Length = 0.55
 
     @property
     def body(self) -> Rover:
@@ -115,7 +117,7 @@ class Brake(Table):
     """
 
     wheel: WheelNumber
-    gear_ratio: Positive = 1.0
+    gear_ratio: Ratio = 1.0
     mirrored: bool = False
 
 
@@ -123,7 +125,7 @@ class Slip(Table):
     """`[slip]`: the slip where the ground speed is not measured, and the speed below which a wheel stands still."""
 
     constant: Annotated[float, Field(gt=-1, lt=1)] = 0.025
-    standstill_rad_s: Positive = 0.05
+    standstill_rad_s: Annotated[float, Field(ge=0.0001, le=5.0)] = 0.05
 
 
 class Smoothing(Table):
@@ -160,7 +162,7 @@ class Recording(Table):
     """`[recording]`: folder, size limit and file length of the recordings."""
 
     directory: Path = Path("/var/lib/regolithd/recordings")
-    limit_MB: Annotated[float, Field(ge=1)] = 4000.0
+    limit_MB: Annotated[float, Field(ge=1, le=1e8)] = 4000.0
     file_minutes: Annotated[float, Field(ge=0.1, le=1440)] = 60.0
     enabled: bool = True
 
@@ -169,7 +171,7 @@ class Mqtt(BrokerSettings):
     """`[mqtt]`: the broker, and the store for messages that it has not acknowledged."""
 
     spool_directory: Path = Path("/var/lib/regolithd/spool")
-    spool_limit_MB: Positive = 200.0
+    spool_limit_MB: Annotated[float, Field(ge=0.01, le=1e6)] = 200.0
 
 
 class Control(Table):
@@ -177,8 +179,8 @@ class Control(Table):
 
     socket: Path = Path("/run/regolithd/control.sock")
     group: str = "regolithd"
-    speed_limit_m_s: Positive = 0.05
-    distance_limit_m: Positive = 1000.0
+    speed_limit_m_s: Annotated[float, Field(ge=0.0001, le=2.0)] = 0.05
+    distance_limit_m: Annotated[float, Field(ge=0.001, le=100_000.0)] = 1000.0
 
 
 class Configuration(Table):

@@ -28,7 +28,8 @@ from regolithd.drivers.devices.device import KnownIdentity, Setting
 from regolithd.drivers.devices.profiles.choice import DeviceChoice, Placement
 
 _OBJECT = re.compile(r"(?:0x)?([0-9A-Fa-f]{4})(?::(?:0x)?([0-9A-Fa-f]{1,2}))?")
-Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFF_FFFF)]
+Unsigned32 = Annotated[int, Field(ge=0, le=0xFFFF_FFFF, strict=True)]
+SettingValue = Annotated[int, Field(strict=True)]
 
 
 def _object(text: str) -> str:
@@ -75,7 +76,7 @@ class DeviceTable(Table):
     revisions: tuple[Unsigned32, Unsigned32] | None = None
     serial: Unsigned32 | None = None
     objects: dict[str, ObjectChoice] = Field(default_factory=dict)
-    settings: dict[ObjectName, int] = Field(default_factory=dict)
+    settings: dict[ObjectName, SettingValue] = Field(default_factory=dict)
 
     def choice(self) -> DeviceChoice:
         """Return it as the drivers take it."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from regolithd.daemon.config import wording
 from regolithd.daemon.config.broker import broker_contradictions, missing_credentials
 from regolithd.daemon.config.configuration import MASTER_NODE, Configuration, Nodes
 from regolithd.drivers.devices.profiles.compose import DescriptionError, compose
@@ -26,6 +28,7 @@ from regolithd.drivers.master.boot_configuration import boot_writes
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
+    from pydantic.fields import FieldInfo
     from pydantic_core import ErrorDetails
 
     from regolithd.daemon.config.devices import DeviceTable
@@ -83,10 +86,13 @@ def missing_files(configuration: Configuration, path: Path) -> list[Problem]:
 def read_tables(path: Path, model: type[Model], checks: Checks[Model]) -> Model:
     """Read a TOML file into a model; `checks` yields key, expected, found and remedy of contradictions in it."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8"
-        raise ConfigurationError([_whole_file(path, reason)]) from error
+        data = path.read_bytes()
+    except OSError as error:
+        raise ConfigurationError([_whole_file(path, error.strerror or str(error))]) from error
+    try:
+        text = data.decode("utf-8-sig")  # Windows' editors begin a file with a byte-order mark
+    except UnicodeDecodeError as error:
+        raise ConfigurationError([_encoding_problem(path, data, error)]) from error
     return _parse(text, path, model, checks)
 
 
@@ -98,7 +104,8 @@ def _parse(text: str, path: Path, model: type[Model], checks: Checks[Model]) -> 
     try:
         configuration = model.model_validate(tables)
     except ValidationError as error:
-        found = [_problem(details, text, path, model) for details in _without_consequences(error.errors())]
+        errors = _without_consequences(_of_one_for_all(error.errors(), tables))
+        found = list(dict.fromkeys(_problem(details, text, path, model) for details in errors))
         # Tables that are valid alone may still contradict each other: report that in the same run.
         together = _problems_together(checks(_valid_tables(tables, model)), text, path)
         raise ConfigurationError(found + together) from error
@@ -113,6 +120,15 @@ def _parse(text: str, path: Path, model: type[Model], checks: Checks[Model]) -> 
 
 def _whole_file(path: Path, reason: str) -> Problem:
     return Problem(str(path), None, "file", "a readable TOML file", reason, "Give its path with --config.")
+
+
+def _encoding_problem(path: Path, data: bytes, error: UnicodeDecodeError) -> Problem:
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return Problem(str(path), None, "encoding", "UTF-8", "UTF-16", "Save the file as UTF-8.")
+    line = data.count(b"\n", 0, error.start) + 1
+    character = data[error.start : error.start + 1].decode("latin-1")
+    found = f"byte 0x{data[error.start]:02X}, which is {character} in Latin-1"
+    return Problem(str(path), line, "encoding", "UTF-8", found, "Save the file as UTF-8.")
 
 
 def _syntax_problem(path: Path, error: tomllib.TOMLDecodeError) -> Problem:
@@ -134,7 +150,18 @@ def _valid_tables(tables: Mapping[str, Any], model: type[Model]) -> Model:
     return model.model_validate(valid)
 
 
-def _without_consequences(errors: list[ErrorDetails]) -> list[ErrorDetails]:
+def _of_one_for_all(errors: list[ErrorDetails], tables: Mapping[str, Any]) -> Iterator[ErrorDetails]:
+    """Yield the errors; where one number was given for all six wheels, without the wheel's index."""
+    for details in errors:
+        *outer, last = details["loc"] or ("",)
+        given: Any = tables
+        for part in outer if isinstance(last, int) else ():
+            given = given.get(part) if isinstance(given, dict) else given
+        scalar = isinstance(last, int) and isinstance(given, bool | int | float | str)
+        yield {**details, "loc": tuple(outer), "input": given} if scalar else details
+
+
+def _without_consequences(errors: Iterable[ErrorDetails]) -> list[ErrorDetails]:
     """Return the errors except those of lists that are long enough: pydantic does not count an invalid element."""
     return [
         details
@@ -144,16 +171,19 @@ def _without_consequences(errors: list[ErrorDetails]) -> list[ErrorDetails]:
 
 
 def _problem(details: ErrorDetails, text: str, path: Path, root: type[BaseModel]) -> Problem:
-    location = [part for part in details["loc"] if isinstance(part, str)]
+    location = [part for part in details["loc"] if isinstance(part, str) and part != "[key]"]
     index = "".join(f"[{part}]" for part in details["loc"] if isinstance(part, int))
-    key = ".".join(location) + index
     if details["type"] == "extra_forbidden":
-        return _unknown_key(location, key, text, path, root)
-    expected = re.sub(r"^(Input|Value|String|Tuple) should (be |have |match )?", "", details["msg"])
-    found = "a table" if isinstance(details["input"], dict) else repr(details["input"])
-    default = _default(location, root)
-    remedy = f"Change it, or leave it out for {default}." if default is not None else "Change it."
-    return Problem(str(path), line_of(text, location), key, expected, found, remedy)
+        return _unknown_key(location, ".".join(location) + index, text, path, root)
+    model = _model_at(location[:-1], root)
+    field = model.model_fields.get(location[-1]) if model else None
+    missing = details["type"] == "missing"
+    key = ".".join(location) + ("" if missing else index)
+    default = _default(field)
+    change = "Add it" if missing and not index else "Change it"
+    remedy = f"{change}, or leave it out for {default}." if default is not None else f"{change}."
+    expected = wording.expected(details, field, location[-1] if location else "")
+    return Problem(str(path), line_of(text, location), key, expected, wording.found(details), remedy)
 
 
 def _unknown_key(location: list[str], key: str, text: str, path: Path, root: type[BaseModel]) -> Problem:
@@ -184,12 +214,10 @@ def _model_at(location: list[str], root: type[BaseModel]) -> type[BaseModel] | N
     return model if tables is None else None
 
 
-def _default(location: list[str], root: type[BaseModel]) -> str | None:
-    model = _model_at(location[:-1], root)
-    field = model.model_fields.get(location[-1]) if model else None
-    if field is None or field.is_required() or isinstance(field.default, BaseModel):
+def _default(field: FieldInfo | None) -> str | None:
+    if field is None or field.is_required() or field.default_factory or isinstance(field.default, BaseModel):
         return None
-    return "none" if field.default is None else str(field.default)
+    return wording.shown(field.default)
 
 
 def _problems_together(found: Iterable[tuple[str, str, str, str]], text: str, path: Path) -> list[Problem]:

@@ -84,7 +84,7 @@ class Accepted(_Line):
 
 
 class Progress(_Line):
-    """Progress of a traverse; `turned_m` is the distance that the wheels' rims have moved."""
+    """Progress of a traverse; `turned_m` is how far the wheels' rims have moved, as measured (their mean)."""
 
     event: Literal["progress"] = "progress"
     elapsed_s: float

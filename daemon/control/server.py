@@ -18,7 +18,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
 from pydantic import ValidationError
 
 from regolithd.daemon.control.protocol import (
@@ -38,8 +37,9 @@ from regolithd.daemon.control.protocol import (
     TraverseRequest,
 )
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
-from regolithd.daemon.control.traverse import Clock, Outcome, Plan, Traverse, TraverseError, Wheels, plan_traverse
+from regolithd.daemon.control.traverse import Clock, Traverse, TraverseError, Wheels, plan_traverse
 from regolithd.daemon.control.traversed import Traversed
+from regolithd.daemon.control.wheel_motion import WheelMotion
 from regolithd.drivers.errors import DriverError
 from regolithd.drivers.master.events import MotionStopped
 
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.control.protocol import _Line
     from regolithd.daemon.messages.mismatch import ComparisonResult
-    from regolithd.daemon.pipeline.snapshot import Estimate, Snapshot
+    from regolithd.daemon.pipeline.snapshot import Estimate
     from regolithd.drivers.master.events import NetworkEvent
     from regolithd.drivers.master.status import NodeStatus
 
@@ -109,14 +109,19 @@ class ControlSink:
         self._owner: asyncio.StreamWriter | None = None
         self._clients: dict[asyncio.StreamWriter, bool] = {}  # oldest first; whether it has sent a whole request
         self._progress: Progress | None = None
-        self._last: Snapshot | None = None
+        self._motion = WheelMotion(configuration)
         self._snapshots = 0
         self.problem = ""
 
     def estimate(self, estimate: Estimate) -> None:
-        """Keep the newest snapshot, for the wheel speeds."""
-        self._last = estimate.snapshot
+        """Take the wheel speeds of a snapshot."""
+        self._motion.take(estimate.snapshot)
         self._snapshots += 1
+
+    @property
+    def wheel_problem(self) -> str:
+        """Which wheels have not done what the last traverse commanded; empty where all have."""
+        return self._motion.problem
 
     def event(self, event: NetworkEvent) -> None:
         """End the traverse when the network has stopped the wheels."""
@@ -237,11 +242,12 @@ class ControlSink:
         assert rover is not None  # noqa: S101  # checked by _not_ready
         assert self._tasks is not None  # noqa: S101  # set before a client is served
         _log.info("traverse of %g m at %g m/s, commanded by %s", plan.distance_m, plan.speed_m_s, _client_name(writer))
+        self._motion.begin(forward=plan.speed_m_s > 0)
         self._traverse = Traverse(
             plan,
             rover,
-            self._standstill_detector,
-            lambda elapsed: self._report_progress(elapsed, plan, writer),
+            self._motion,
+            lambda elapsed: self._report_progress(elapsed, writer),
             self._clock,
         )
         self._owner = writer
@@ -256,7 +262,8 @@ class ControlSink:
             self._traverse = self._owner = self._progress = None
         self._note_end(Traversed(from_ns=begun_ns, to_ns=time.time_ns(), ending=outcome.ending.value))
         _log.info("traverse %s after %.2f s: %s", outcome.ending.value, outcome.elapsed_s, outcome.text)
-        _send(writer, _ended(outcome, traverse.plan))
+        turned_m, text = self._motion.turned_m, outcome.text
+        _send(writer, Ended(ending=outcome.ending, elapsed_s=outcome.elapsed_s, turned_m=turned_m, text=text))
         with suppress(ConnectionError):
             await writer.drain()
 
@@ -269,22 +276,9 @@ class ControlSink:
             except OSError as error:
                 _log.warning("the end of the traverse could not be noted in %s: %s", recording.directory, error)
 
-    def _report_progress(self, elapsed_s: float, plan: Plan, writer: asyncio.StreamWriter) -> None:
-        self._progress = Progress(elapsed_s=elapsed_s, turned_m=elapsed_s * abs(plan.speed_m_s))
+    def _report_progress(self, elapsed_s: float, writer: asyncio.StreamWriter) -> None:
+        self._progress = Progress(elapsed_s=elapsed_s, turned_m=self._motion.turned_m)
         _send(writer, self._progress)
-
-    def _standstill_detector(self) -> Callable[[], bool]:
-        """Return a function that says whether all wheels stand still, by a snapshot whose SYNC came after this call."""
-        begun = self._snapshots
-
-        def standing() -> bool:
-            if self._last is None or self._snapshots < begun + 2:  # the first SYNC may have come before this call
-                return False
-            wheel_speed = self._last.motor_speed_rad_s / self._configuration.drivetrain.ratio
-            # A wheel that was not measured (NaN) may turn.
-            return bool(np.all(np.abs(wheel_speed) < self._configuration.slip.standstill_rad_s))
-
-        return standing
 
     async def _stop(self, request: StopRequest, writer: asyncio.StreamWriter) -> _Line:
         who = _client_name(writer)
@@ -338,15 +332,6 @@ def _is_below(path: str, folder: Path) -> bool:
 def _send(writer: asyncio.StreamWriter, reply: _Line) -> None:
     if not writer.is_closing():
         writer.write(reply.line())
-
-
-def _ended(outcome: Outcome, plan: Plan) -> Ended:
-    return Ended(
-        ending=outcome.ending,
-        elapsed_s=outcome.elapsed_s,
-        turned_m=outcome.elapsed_s * abs(plan.speed_m_s),
-        text=outcome.text,
-    )
 
 
 def _not_ready(rover: Rover | None) -> Refused | None:

@@ -6,9 +6,11 @@ on the slip.
 | condition | the wheels are | ending |
 |---|---|---|
 | the duration has passed | set to speed 0; once measured to stand still, disabled | finished |
+| the same, but a wheel has turned less than the distance | the same | incomplete |
 | `stop(quick=False)` | the same | stopped |
 | not at a standstill `STANDSTILL_TIMEOUT_S` after speed 0 | quick-stopped, disabled | quick-stopped |
 | `stop(quick=True)`, or a drive fails | quick-stopped, disabled | quick-stopped |
+| a wheel does not follow (`wheel_motion`) | quick-stopped, disabled | quick-stopped |
 | a quick stop is not confirmed in `QUICK_STOP_TIMEOUT_S` | sent both commands | failed |
 | the drives cannot be enabled | not driven | failed |
 """
@@ -81,6 +83,7 @@ class Ending(StrEnum):
     """How a traverse ended (table above)."""
 
     FINISHED = "finished"  # complete, and stopped with the drives' ramp
+    INCOMPLETE = "incomplete"  # likewise after its duration, but not every wheel has turned the distance
     STOPPED = "stopped"  # stopped early with the drives' ramp, on request
     QUICK_STOPPED = "quick-stopped"  # stopped by a quick stop
     FAILED = "failed"  # the drives could not be enabled, or did not confirm the stop
@@ -111,6 +114,23 @@ class Wheels(Protocol):
         """Disable all drives: no torque."""
 
 
+class Measured(Protocol):
+    """What the wheels are measured to do, as `wheel_motion.WheelMotion` tells."""
+
+    @property
+    def problem(self) -> str:
+        """Which wheels do not follow the last command; empty where all do."""
+
+    def commanded(self, wheel_speed_rad_s: float) -> None:
+        """Note that all wheels have been commanded to turn at this speed."""
+
+    def shortfall(self, distance_m: float, speed_m_s: float) -> str:
+        """Return which wheels have turned less than this distance; empty where all have turned it."""
+
+    def standstill_detector(self) -> Callable[[], bool]:
+        """Return a function that says whether all six have been measured to stand still since this call."""
+
+
 class Clock:
     """The monotonic clock; tests replace it."""
 
@@ -135,16 +155,15 @@ class Traverse:
         Distance and speed.
     wheels
         The drives.
-    standstill_detector
-        Called when the wheels are told to stop; returns a function that says whether all six have been measured to
-        stand still since.
+    measured
+        What the wheels are measured to do.
     report
         Called with the seconds driven, every `REPORT_PERIOD_S`.
     """
 
     plan: Plan
     wheels: Wheels
-    standstill_detector: Callable[[], Callable[[], bool]]
+    measured: Measured
     report: Callable[[float], None]
     clock: Clock = field(default_factory=Clock)
     _interrupted: asyncio.Event = field(default_factory=asyncio.Event)
@@ -176,13 +195,17 @@ class Traverse:
             return await self._end_by_quick_stop(elapsed, problem)
         if self._interrupted.is_set():
             return Outcome(Ending.STOPPED, elapsed, self._why)
+        if missing := self.measured.shortfall(self.plan.distance_m, self.plan.speed_m_s):
+            return Outcome(Ending.INCOMPLETE, elapsed, missing)
         return Outcome(Ending.FINISHED, elapsed, "the traverse is complete")
 
     async def _drive(self) -> str:
         """Drive, and stop with the drives' ramp; return why a quick stop is needed, or an empty text."""
         if not self._interrupted.is_set():  # `stop` may have been called while the drives were being enabled
-            await self.wheels.set_speed((self.plan.wheel_speed_rad_s,) * 6)
+            await self._set_speed(self.plan.wheel_speed_rad_s)
         while not self._interrupted.is_set() and (left := self._left_s()) > 0:
+            if self.measured.problem:
+                return self.measured.problem
             self.report(self.plan.duration_s - left)
             await self.clock.wait(self._interrupted, min(REPORT_PERIOD_S, left))
         if self._quick:
@@ -193,9 +216,13 @@ class Traverse:
         began = self.clock.now_s() if self._began is None else self._began
         return began + self.plan.duration_s - self.clock.now_s()
 
+    async def _set_speed(self, wheel_speed_rad_s: float) -> None:
+        await self.wheels.set_speed((wheel_speed_rad_s,) * 6)
+        self.measured.commanded(wheel_speed_rad_s)
+
     async def _stop_with_ramp(self) -> str:
-        await self.wheels.set_speed((0.0,) * 6)
-        standing = self.standstill_detector()
+        await self._set_speed(0.0)
+        standing = self.measured.standstill_detector()
         deadline = self.clock.now_s() + STANDSTILL_TIMEOUT_S
         while not standing():
             if self._quick:
@@ -215,6 +242,7 @@ class Traverse:
     async def _quick_stop(self) -> str:
         """Quick-stop and disable; return the first error, or an empty text."""
         problem = ""
+        self.measured.commanded(0.0)
         for command in (self.wheels.quick_stop, self.wheels.disable):
             try:
                 async with asyncio.timeout(QUICK_STOP_TIMEOUT_S):

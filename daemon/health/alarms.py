@@ -62,6 +62,7 @@ class AlarmInputs:
     recording_remedy: str = ""
     recording_short: bool = False
     control_problem: str = ""
+    wheel_problem: str = ""
     broker_problem: str = ""
     model_problem: str = ""
     undecodable: tuple[str, ...] = ()
@@ -78,6 +79,7 @@ def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
         *_bus_alarms(inputs),
         *_intruder_alarms(inputs),
         *_undecodable_alarms(inputs),
+        *_wheel_alarms(inputs),
         *_daemon_alarms(inputs),
     ]
     return {alarm.name: alarm for alarm in found}
@@ -140,17 +142,7 @@ def _intruder_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
 
 def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     yield from _store_alarms(inputs)
-    if inputs.recording_problem:
-        yield Alarm(
-            "recording",
-            Severity.ERROR,
-            inputs.recording_problem,
-            inputs.recording_remedy,
-        )
-    elif inputs.recording_short:
-        text = "the disk has less room than [recording] limit_MB: the oldest recordings are deleted earlier"
-        remedy = "Copy recordings elsewhere and free space on the disk, or lower [recording] limit_MB."
-        yield Alarm("recording", Severity.WARNING, text, remedy)
+    yield from _recording_alarms(inputs)
     if inputs.broker_problem:
         remedy = "Messages are stored meanwhile, and sent, marked late, once there is a connection."
         yield Alarm("broker", Severity.WARNING, inputs.broker_problem, remedy)
@@ -179,6 +171,23 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
         text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
         remedy = "Synchronise it before the daemon starts (time-sync.target)."
         yield Alarm("clock", Severity.WARNING, text, remedy, latching=True)
+
+
+def _recording_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.recording_problem:
+        yield Alarm("recording", Severity.ERROR, inputs.recording_problem, inputs.recording_remedy)
+    elif inputs.recording_short:
+        text = "the disk has less room than [recording] limit_MB: the oldest recordings are deleted earlier"
+        remedy = "Copy recordings elsewhere and free space on the disk, or lower [recording] limit_MB."
+        yield Alarm("recording", Severity.WARNING, text, remedy)
+
+
+def _wheel_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.wheel_problem:
+        remedy = (
+            "Look at these wheels before the next traverse, which ends this alarm: blocked, or a gear or drive failed."
+        )
+        yield Alarm("wheel", Severity.ERROR, inputs.wheel_problem, remedy)
 
 
 def _soil_change(changed: SoilChange) -> Alarm:

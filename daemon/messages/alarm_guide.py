@@ -154,6 +154,20 @@ _GUIDES = (
         "the socket could be created; that is tried every five seconds.",
     ),
     AlarmGuide(
+        "wheel",
+        "In the last traverse a wheel did not turn at the commanded speed, within a fifth, or has turned less than the "
+        "distance. The text names wheel and node.",
+        "The traverse was ended by a quick stop, or was driven and is not complete: a rover that drags a wheel digs "
+        "itself in.",
+        (
+            "Look at the wheel: blocked, dug in, a coupling or a gear broken.",
+            "All wheels too slow: the drives are at their limit (object 0x607F, or the supply). Drive more slowly.",
+            "`regolithd status` shows the drive's state; `emcy` and `event` what it reported.",
+            "A drive that turns in the maker's program, and not here: see its RPDO 1 with `regolithd check`.",
+        ),
+        "the next traverse begins.",
+    ),
+    AlarmGuide(
         "clock",
         "The computer's clock was set by more than half a second while the daemon ran.",
         "Times before and after are not comparable. Order, and the intervals within a SYNC, are right.",

@@ -67,6 +67,8 @@ class MqttSink:
         The publisher that delivers the messages.
     control_problem
         Returns why no commands can be taken, or an empty text.
+    wheel_problem
+        Returns which wheels have not done what the last traverse commanded, or an empty text.
     monotonic_ns
         The clock by which events are throttled and alarms end.
     """
@@ -77,11 +79,13 @@ class MqttSink:
         publisher: Publisher,
         *,
         control_problem: Callable[[], str] = lambda: "",
+        wheel_problem: Callable[[], str] = lambda: "",
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.publisher = publisher
         self._service = service
         self._control_problem = control_problem
+        self._wheel_problem = wheel_problem
         self._monotonic_ns = monotonic_ns
         self._started_ns = monotonic_ns()
         self._published_nodes: dict[int, NodeStatus] = {}
@@ -237,6 +241,7 @@ class MqttSink:
             recording_remedy=recorder.remedy if recorder is not None else "",
             recording_short=recorder is not None and recorder.deletes_early,
             control_problem=self._control_problem(),
+            wheel_problem=self._wheel_problem(),
             broker_problem=self._broker_problem(),
             model_problem=service.models.problem,
             undecodable=self._undecodable.lasting(self._monotonic_ns()),

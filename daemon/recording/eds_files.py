@@ -9,6 +9,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from regolithd.drivers.canopen.eds_text import decoded
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -21,7 +23,7 @@ _KEY = "eds "
 def eds_metadata(configuration: Configuration) -> dict[str, str]:
     """Return the text of each EDS file that a configuration names, by its metadata key."""
     files = {table.eds for table in configuration.devices.values() if table.eds}
-    return {f"{_KEY}{path}": path.read_text(encoding="utf-8-sig", errors="replace") for path in sorted(files)}
+    return {f"{_KEY}{path}": decoded(path.read_bytes()) for path in sorted(files)}
 
 
 def with_recorded_eds(configuration: Configuration, metadata: Mapping[str, str]) -> Configuration:

@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import io
 from functools import cache
 from typing import TYPE_CHECKING
 
-import canopen
-from canopen.objectdictionary import ODVariable, datatypes
-
+from regolithd.drivers.canopen.eds import STRUCT_CODES, parse_eds
+from regolithd.drivers.canopen.eds_text import EdsError, decoded
 from regolithd.drivers.errors import DictionaryError
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-_FIRST_OBJECT = 0x1000  # below are data types
+    import canopen
+    from canopen.objectdictionary import ODVariable
 
-# CiA 301, table 44: the numeric data types in a PDO or an SDO, as `struct` codes.
-STRUCT_CODES = {
-    datatypes.BOOLEAN: "?",
-    datatypes.INTEGER8: "b",
-    datatypes.INTEGER16: "h",
-    datatypes.INTEGER32: "i",
-    datatypes.INTEGER64: "q",
-    datatypes.UNSIGNED8: "B",
-    datatypes.UNSIGNED16: "H",
-    datatypes.UNSIGNED32: "I",
-    datatypes.UNSIGNED64: "Q",
-    datatypes.REAL32: "f",
-    datatypes.REAL64: "d",
-}
+_FIRST_OBJECT = 0x1000  # below are data types
 
 
 @cache
@@ -41,27 +27,29 @@ def object_dictionary(eds: Path) -> canopen.ObjectDictionary:
     DictionaryError
         There is no such file, or it is no EDS.
     """
-    try:
-        text = eds.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise DictionaryError(f"the EDS file {eds} cannot be read: {error.strerror}", remedy="Correct `eds`") from error
-    try:
-        found = parse_eds(text, 0)
-    except Exception as error:  # the parser raises whatever a damaged file causes: KeyError, ValueError, …
-        what = " ".join(str(error).split()) or type(error).__name__
-        raise DictionaryError(
-            f"{eds.name} is no EDS file that can be read: {what}", remedy="Take the maker's file anew"
-        ) from error
+    found = read_eds(eds, 0)
     if not any(isinstance(index, int) and index >= _FIRST_OBJECT for index in found):
         raise DictionaryError(f"{eds.name} describes no object", remedy="Take the maker's EDS or DCF file")
     return found
 
 
-def parse_eds(text: str, node_id: int) -> canopen.ObjectDictionary:
-    """Return the object dictionary in an EDS file's text; raises whatever canopen's parser does."""
-    stream = io.StringIO(text)
-    stream.name = "text.eds"  # canopen takes the format from the name
-    return canopen.import_od(stream, node_id)
+def read_eds(eds: Path, node_id: int) -> canopen.ObjectDictionary:
+    """Return the object dictionary of an EDS or DCF file, for one node-ID.
+
+    Raises
+    ------
+    DictionaryError
+        There is no such file, it is no EDS, or a value in it cannot be; the message names file, section and entry.
+    """
+    try:
+        text = decoded(eds.read_bytes())
+    except OSError as error:
+        raise DictionaryError(f"the EDS file {eds} cannot be read: {error.strerror}", remedy="Correct `eds`") from error
+    try:
+        return parse_eds(text, node_id)
+    except EdsError as error:
+        remedy = "Correct it there, or take the maker's file anew"
+        raise DictionaryError(f"the EDS file {eds.name} cannot be used: {error}", remedy=remedy) from error
 
 
 def known_variable(eds: Path, index: int, subindex: int = 0) -> ODVariable | None:

@@ -7,6 +7,7 @@ with the controlword and the target velocity, so that no drive receives only one
 from __future__ import annotations
 
 import asyncio
+import math
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from regolithd.drivers.devices.device import Commanded
 from regolithd.drivers.devices.motor_controller import (
     CONTROLWORD,
     ERROR_CODE,
+    MAX_VELOCITY,
     MODE_DISPLAY,
     PROFILE_VELOCITY,
     STATUSWORD_OBJECT,
@@ -49,6 +51,7 @@ class Drive:
         self.node_id = remote.node.node_id
         self.statusword: int | None = None
         self.reported = DriveState.UNKNOWN  # in the last `DriveStateChanged` event
+        self._limit = 0  # 0x607F when it was enabled, in velocity units; 0: none
         self._bus = bus
         self._rpdo = rpdos(remote.node.device)[0]
         self._velocity_unit = next(each.scale for each in _commanded(remote.node) if each.index == TARGET_VELOCITY)
@@ -72,6 +75,8 @@ class Drive:
         mode = await sdo.read_number(MODE_DISPLAY, signed=True)
         if mode != PROFILE_VELOCITY:
             raise self._error(f"is in mode {mode} instead of profile velocity mode (3)", "Boot the node again")
+        with suppress(SdoAbortError):  # optional in CiA 402
+            self._limit = await sdo.read_number(MAX_VELOCITY)
         await sdo.write(TARGET_VELOCITY, 0, bytes(4))
         deadline = asyncio.get_running_loop().time() + _ENABLE_TIMEOUT_S
         last = Controlword.DISABLE_VOLTAGE
@@ -104,11 +109,18 @@ class Drive:
     async def turn(self, motor_speed_rad_s: float) -> None:
         """Send the target velocity [rad/s at the motor, forward positive]; the drive must be in operation enabled."""
         direction = -1 if self.remote.node.mirrored else 1
-        try:
-            factor = self.remote.factor(self._velocity_unit)
-        except UnknownUnitError as error:
-            raise self._error(f"cannot be commanded: {error}", "Boot the node again") from error
-        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s / factor))
+        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s / self._factor()))
+
+    @property
+    def speed_limit_rad_s(self) -> float:
+        """The highest speed [rad/s at the motor] that it turns at, as it said when it was enabled.
+
+        Raises
+        ------
+        DriveError
+            The unit of its velocities is not known.
+        """
+        return self._limit * self._factor() if self._limit else math.inf
 
     async def send_quick_stop(self) -> None:
         """Send the quick stop and do not wait."""
@@ -136,6 +148,12 @@ class Drive:
     async def disable(self) -> None:
         """Disable the motor's voltage; it must be at standstill."""
         await self._write_controlword(Controlword.DISABLE_VOLTAGE)
+
+    def _factor(self) -> float:
+        try:
+            return self.remote.factor(self._velocity_unit)
+        except UnknownUnitError as error:
+            raise self._error(f"cannot be commanded: {error}", "Boot the node again") from error
 
     def _standing(self) -> bool:
         return self.statusword is not None and at_standstill(self.statusword)

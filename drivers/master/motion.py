@@ -7,6 +7,7 @@ is still under way cannot restart them.
 from __future__ import annotations
 
 import asyncio
+import math
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.errors import BusError, DriveError, DriverError
@@ -59,12 +60,16 @@ class Motion:
                 raise DriveError("the drive is not operational", node_id=node_id)
             if drive.state is not DriveState.ENABLED:
                 raise DriveError(f"the drive is in {drive.state}", node_id=node_id, remedy="Enable it first")
+        speeds = [
+            (drive, wheel_speed_rad_s[wheel] * self._gear_ratio)
+            for drive in self._drives.values()
+            if (wheel := drive.remote.node.wheel) is not None
+        ]
+        _check_limits(speeds)
         self.moving = any(wheel_speed_rad_s)
         try:
-            for drive in self._drives.values():
-                wheel = drive.remote.node.wheel
-                if wheel is not None:
-                    await drive.turn(wheel_speed_rad_s[wheel] * self._gear_ratio)
+            for drive, speed in speeds:
+                await drive.turn(speed)
         except BusError:
             self._lock("a command could not be sent to all of them")
             await each(drive.send_quick_stop() for drive in self._drives.values())
@@ -106,6 +111,21 @@ async def each(actions: Iterable[Awaitable[None]]) -> list[DriverError]:
         elif isinstance(result, BaseException):
             raise result
     return failures
+
+
+def _check_limits(speeds: Sequence[tuple[Drive, float]]) -> None:
+    """Raise `DriveError` where a drive would turn more slowly than it is told; half a percent is its rounding."""
+    limited = [
+        f"node {drive.node_id} {drive.speed_limit_rad_s:.1f}"
+        for drive, speed in speeds
+        if abs(speed) > 1.005 * drive.speed_limit_rad_s
+    ]
+    if limited:
+        fastest = max(abs(speed) for _, speed in speeds)
+        allowed = f"more than object 0x607F allows ({', '.join(limited)} rad/s)"
+        what = f"the motors would have to turn at {fastest:.1f} rad/s, {allowed}"
+        share = min(drive.speed_limit_rad_s for drive, _ in speeds) / fastest
+        raise DriveError(what, remedy=f"Choose at most {math.floor(100 * share)} % of this speed")
 
 
 def _drive_error(failures: Sequence[DriverError]) -> DriveError:

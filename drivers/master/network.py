@@ -175,7 +175,8 @@ class Network:
         Raises
         ------
         DriveError
-            A drive is not in operation enabled, or the wheels were stopped since; nothing has been sent then.
+            A drive is not in operation enabled, or cannot turn so fast (0x607F), or the wheels were stopped since;
+            nothing has been sent then.
         BusError
             It could not be sent; all drives are stopped, or stop by themselves without the master's heartbeat.
         """

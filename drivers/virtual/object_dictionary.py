@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from canopen.objectdictionary import ODVariable
 
-from regolithd.drivers.canopen.object_dictionary import STRUCT_CODES, parse_eds
+from regolithd.drivers.canopen.eds import STRUCT_CODES
+from regolithd.drivers.canopen.object_dictionary import read_eds
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ class Dictionary:
 @cache
 def _entries(path: Path, node_id: int) -> Mapping[Key, Entry]:
     """Return what the EDS describes; `$NODEID` in a default is the node's."""
-    od = parse_eds(path.read_text(encoding="utf-8-sig", errors="replace"), node_id)
+    od = read_eds(path, node_id)
     return MappingProxyType({(each.index, each.subindex): _entry(each) for each in _variables(od)})
 
 

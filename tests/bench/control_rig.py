@@ -4,6 +4,7 @@ import asyncio
 import grp
 import json
 import os
+import time
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
@@ -14,11 +15,11 @@ import numpy as np
 from estimates import estimate
 from subscriber import until
 
-from regolithd.daemon.config.configuration import Configuration, Control, Recording
+from regolithd.daemon.config.configuration import Configuration, Control, Recording, SyncTiming
 from regolithd.daemon.control.protocol import REPLY, Ended, Progress
 from regolithd.daemon.control.server import ControlSink
-from regolithd.daemon.pipeline.snapshot import Snapshot
-from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.daemon.pipeline.snapshot import ROW, Snapshot
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER, MOTOR_SPEED
 from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import DriveError
 from regolithd.drivers.master.status import NodePhase, NodeStatus
@@ -33,6 +34,8 @@ class Rover:
     told: list[str] = field(default_factory=list)
     phase: NodePhase = NodePhase.OPERATIONAL
     problem: str = ""
+    speeds: np.ndarray = field(default_factory=lambda: np.zeros(6))  # [rad/s at the wheel]
+    shares: np.ndarray = field(default_factory=lambda: np.ones(6))  # of the commanded speed, at which each wheel turns
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
@@ -53,10 +56,12 @@ class Rover:
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
         """Record the speed."""
         self.told.append(f"speed {wheel_speed_rad_s[0]:.3f}")
+        self.speeds = self.shares * wheel_speed_rad_s
 
     async def quick_stop(self) -> None:
         """Record the quick stop."""
         self.told.append("quick stop")
+        self.speeds = np.zeros(6)
 
     async def disable(self) -> None:
         """Record the command to disable."""
@@ -67,19 +72,22 @@ class Rover:
 
 @asynccontextmanager
 async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlSink, Path]]:
-    """Serve a rover whose wheels stand still."""
+    """Serve a rover whose wheels turn as they are told, measured 100 times a second."""
     path = folder / "control.sock"
     configuration = Configuration(
         control=Control.model_validate({"socket": path, "group": GROUP} | control),
         recording=Recording(directory=folder),
+        sync=SyncTiming(rate_Hz=100.0),
     )
     sink = ControlSink(configuration, lambda: rover)
     task = asyncio.create_task(sink.run())
 
     async def measure() -> None:
         while True:
-            still = np.zeros((10, 6))
-            sink.estimate(estimate_of(Snapshot(0, 0, still)))
+            values = np.zeros((10, 6))
+            if rover is not None:
+                values[ROW[MOTOR_SPEED]] = rover.speeds * configuration.drivetrain.ratio
+            sink.estimate(estimate_of(Snapshot(0, time.time_ns(), values)))
             await asyncio.sleep(0.01)
 
     measuring = asyncio.create_task(measure())

@@ -85,3 +85,5 @@ def test_the_status_says_what_the_publisher_knows_of_the_broker(
     assert ("control", 10.0) in expected
     control.problem = "no socket"
     assert mqtt._control_problem() == "no socket"
+    control._motion.problem = "wheel 3 (node 3) at 0.000"
+    assert mqtt._wheel_problem() == "wheel 3 (node 3) at 0.000"

@@ -48,8 +48,8 @@ def copy_drivetrain(simulation: Path, config: Path) -> ConfigurationUpdate:
     BenchError
         The constants of Eq. 11 differ between the two, or the simulation has no drivetrain.
     """
-    found = tomllib.loads(simulation.read_text(encoding="utf-8"))
-    text = config.read_text(encoding="utf-8")
+    found = tomllib.loads(simulation.read_text(encoding="utf-8-sig"))
+    text = config.read_text(encoding="utf-8-sig")
     rover = tomllib.loads(text)
     if "drivetrain" not in found:
         raise BenchError(f"{simulation} has no [drivetrain]: it is no simulation of this rover")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def load_cells(recording: Path, config: Path, plot: Path | None) -> ConfigurationUpdate:
     """Fit zero and span of the load cell of each wheel that has `weight_kg` in the recording."""
-    text = config.read_text(encoding="utf-8")
+    text = config.read_text(encoding="utf-8-sig")
     table = LoadCells(**tomllib.loads(text).get("load_cells", {}))
     values = {name: list(getattr(table, name)) for name in ("zero_N", "zero_std_N", "span", "span_std")}
     messages: list[str] = []
@@ -52,7 +52,7 @@ def load_cells(recording: Path, config: Path, plot: Path | None) -> Configuratio
 
 def wheels_up(recording: Path, config: Path, plot: Path | None) -> ConfigurationUpdate:
     """Fit the no-load current of each wheel that has motor speed and current in the recording."""
-    text = config.read_text(encoding="utf-8")
+    text = config.read_text(encoding="utf-8-sig")
     table = _drivetrain(text)
     names = {
         "no_load_current_A": "coulomb_A",
@@ -79,7 +79,7 @@ def wheels_up(recording: Path, config: Path, plot: Path | None) -> Configuration
 
 def brake(recording: Path, config: Path, plot: Path | None) -> ConfigurationUpdate:
     """Fit the efficiency against torque of each wheel that has `brake_torque_Nm` in the recording."""
-    text = config.read_text(encoding="utf-8")
+    text = config.read_text(encoding="utf-8-sig")
     table = _drivetrain(text)
     names = ("gain_factor", "gain_factor_std", "load_loss_per_Nm", "load_loss_std_per_Nm")
     values = {name: list(getattr(table, name)) for name in names}
@@ -120,7 +120,7 @@ def radius(
     """Take the mean radius of the wheels that turned; distance and its standard deviation in metres."""
     if distance_m <= 0:
         raise BenchError("give the distance, for example: --distance 5.03 --distance-std 0.005")
-    text = config.read_text(encoding="utf-8")
+    text = config.read_text(encoding="utf-8-sig")
     ratio = _drivetrain(text).ratio
     turned = dict(_wheels(recording, "t_s", "motor_speed_rad_s"))
     found = {

@@ -180,7 +180,7 @@ def compare_fleet(
         _of_channel(members, load, one_channel(simulation, channel), channel, level, work) for channel in channels
     ]
     work.tidy()
-    answers = [answer_of_fleet(chosen) for chosen in compared]
+    answers = [answer_of_fleet(chosen, len(compared)) for chosen in compared]
     rows = tuple(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )

@@ -57,9 +57,12 @@ class HeldOutErrors:
     whole: float
 
     def without_gain(self) -> int | None:
-        """Return the index of the term that lowers the held-out error least, if it does not lower it at all."""
+        """Return the index of the term that lowers the held-out error least, if it or all together do not lower it.
+
+        Of two effects that cancel each other, and a parameter, each lowers the error that the other makes.
+        """
         gains = [before - after for before, after in zip(self.without, self.with_it, strict=True)]
-        if not gains or min(gains) > 0:
+        if not gains or (min(gains) > 0 and self.after < self.before):
             return None
         return gains.index(min(gains))
 

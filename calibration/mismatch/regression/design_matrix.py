@@ -32,6 +32,21 @@ LEAST_SCALE = float(np.finfo(np.float32).tiny)
 
 
 @dataclass(frozen=True, eq=False)
+class Reliability:
+    """By what readings are multiplied to scatter alike, shape (wheel, time in the order of folds) each.
+
+    Attributes
+    ----------
+    alone: each reading by itself
+    in_means: so that a mean of many readings is as uncertain as it is: errors that wheels have in common, or that last,
+        do not average out
+    """
+
+    alone: Single
+    in_means: Single
+
+
+@dataclass(frozen=True, eq=False)
 class Course:
     """The compared readings of some wheels in one course: one wheel after the other, each in the order of time.
 
@@ -77,8 +92,7 @@ class DesignMatrix:
     cuts: where each fold begins and ends in that order, shape (fold + 1,)
     readings: where each wheel's readings are in that order, as they followed each other in time; and their runs
     whitening: of the noise
-    reliability: of each reading, by which it is multiplied before it is whitened, shape (wheel, time), in the order of
-        folds; None: all are alike
+    reliability: of the readings, which are multiplied by that in means before they are whitened; None: all are alike
     residual_as_read: measured less predicted, shape (wheel, time), in the order of folds, 0 outside the mask
     residual: the same, whitened
     energy, counts: sum of squares and number of the whitened residual's readings, shape (fold, wheel)
@@ -102,7 +116,7 @@ class DesignMatrix:
     _whitened: ColumnFile = field(repr=False)
     """The same file where nothing is whitened."""
     _sums: Sums = field(repr=False)
-    reliability: Single | None = field(default=None, repr=False)
+    reliability: Reliability | None = field(default=None, repr=False)
 
     @property
     def size(self) -> int:
@@ -157,7 +171,7 @@ class DesignMatrix:
         """Return readings (…, wheel, time in the order of folds), whitened, of all wheels or of some; 0 elsewhere."""
         on = range(len(self.readings)) if wheels is None else wheels
         if self.reliability is not None:
-            values = values * self.reliability[list(on)]
+            values = values * self.reliability.in_means[list(on)]
         if self.whitening is NOT_WHITENED:
             return values
         found, flat = np.zeros_like(values), values.reshape(*values.shape[:-2], -1)
@@ -178,7 +192,7 @@ class DesignMatrix:
         place = np.concatenate([places for places, _ in on])
         wheel = np.repeat(np.asarray(wheels, np.int64), [len(places) for places, _ in on])
         in_time = self.order[place] * len(self.readings) + wheel
-        reliability = None if self.reliability is None else self.reliability[wheel, place]
+        reliability = None if self.reliability is None else self.reliability.in_means[wheel, place]
         return Course(wheel, place, in_time, wheel * len(self.order) + place, tuple(runs), self.whitening, reliability)
 
     def in_folds(self, values: NDArray[Any]) -> NDArray[Any]:
@@ -195,7 +209,7 @@ class DesignMatrix:
         """Return readings (…, time, wheel) in the order of time, whitened; 0 without readings."""
         return self.in_time(self.whitened(self.in_folds(values)))
 
-    def whitened_by(self, whitening: Whitening, reliability: Single | None = None) -> DesignMatrix:
+    def whitened_by(self, whitening: Whitening, reliability: Reliability | None = None) -> DesignMatrix:
         """Return the same columns under another whitening and reliability; the sums under these are not kept."""
         self._sums.forget()
         same = whitening is NOT_WHITENED and reliability is None

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.problem.problem import Problem
-    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix, Reliability
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.nuisance import Nuisance
     from regolithd.calibration.mismatch.signal.noise_models.whitening import Whitening
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Single = NDArray[np.float32]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
 Derived = TypeVar("Derived")
 
@@ -100,7 +99,7 @@ class NormalEquations:
             return self
         return normal_equations(self.design, self.nuisance, weights, self.folds)
 
-    def whitened(self, whitening: Whitening, weights: Array, reliability: Single | None = None) -> NormalEquations:
+    def whitened(self, whitening: Whitening, weights: Array, reliability: Reliability | None = None) -> NormalEquations:
         """Return the equations under another whitening, with the weights of the whitened wheels."""
         return normal_equations(self.design.whitened_by(whitening, reliability), self.nuisance, weights, self.folds)
 

@@ -86,7 +86,7 @@ def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
     """Return the equations whitened by the noise of a residual [time, wheel], readings in doubt weighing less."""
     design, courses = equations.design, []
     reliability, values = reliability_of(design, residual), design.in_folds(residual)
-    values = values if reliability is None else values * reliability
+    values = values if reliability is None else values * reliability.in_means
     for (places, runs), of_wheel in zip(design.readings, values, strict=True):
         deviation = float(np.sqrt(np.mean(of_wheel[places] ** 2))) if len(places) else 0.0
         if deviation > 0:

@@ -69,9 +69,12 @@ def _given(equations: NormalEquations, terms: Sequence[Term]) -> GivenColumns:
 
 
 def _weighed(equations: NormalEquations, series: Array) -> Array:
-    """Return series (…, wheel, time by folds) multiplied by what makes readings scatter alike."""
+    """Return series (…, wheel, time by folds) multiplied by what makes readings scatter alike, each by itself.
+
+    How little a mean of many tells, where errors last, is a matter of the spectrum.
+    """
     reliability = equations.design.reliability
-    return series if reliability is None else series * reliability
+    return series if reliability is None else series * reliability.alone
 
 
 def _roughness(equations: NormalEquations, terms: Sequence[Term]) -> Array | None:

@@ -100,12 +100,12 @@ class _Composition:
     def _group(self, source: Source) -> tuple[PdoObject, ...]:
         """Return the objects that hold a quantity and its status; empty where there is none, which may be a problem."""
         placement = self._placements.get(source.quantity.name)
-        reasons: list[DictionaryError] = []
+        reasons: list[tuple[Measured, DictionaryError]] = []
         for candidate in self._candidates(source, placement):
             try:
                 self._check(candidate)
             except DictionaryError as error:
-                reasons.append(error)
+                reasons.append((candidate, error))
             else:
                 return self._with_status(candidate, source)
         self._not_offered(source, placement, reasons)
@@ -163,17 +163,25 @@ class _Composition:
             return (candidate,)
         return (candidate, status)
 
-    def _not_offered(self, source: Source, placement: Placement | None, reasons: list[DictionaryError]) -> None:
+    def _not_offered(
+        self, source: Source, placement: Placement | None, reasons: list[tuple[Measured, DictionaryError]]
+    ) -> None:
         name = source.quantity.name
         if not reasons:
             return  # a wrong unit, reported already
         if source.diagnostic and placement is None:
-            self._left_out.append(f"{name}: {reasons[0].what}")
+            self._left_out.append(f"{name}: {reasons[0][1].what}")
             return
-        first = reasons[0]
         key = f"objects.{name}"
-        remedy = source.cure if placement is None else "Correct object or unit"
-        self._problem(f"{name}: {first.what}", key, (first.index or 0, first.subindex), remedy or self._cure(name))
+        remedy = (source.cure if placement is None else "Correct object or unit") or self._cure(name)
+        objects = dict.fromkeys((each.index, each.subindex) for each, _ in reasons)
+        there = [error for each, error in reasons if known_variable(self._eds, each.index, each.subindex)]
+        if not there and len(objects) > 1:
+            absent = ", ".join(f"0x{index:04X}:{subindex:02X}" for index, subindex in objects)
+            self._problem(f"{name}: the EDS file {self._eds.name} has none of {absent}", key, remedy=remedy)
+            return
+        first = (there or [reasons[0][1]])[0]
+        self._problem(f"{name}: {first.what}", key, (first.index or 0, first.subindex), remedy)
 
     def _cure(self, name: str) -> str:
         table = f"[devices.{self._kind.configuration_key}"

@@ -54,7 +54,9 @@ _SPEED_CURE = 'State the unit in [devices.motors.objects]: `motor_speed_rad_s = 
 _CURRENT_CURE = (
     'State object and unit in [devices.motors.objects]: `motor_current_A = {object = "0x6078", unit = "mA"}`'
 )
-_LOAD_CURE = 'State object and unit in [devices.load_cells.objects]: `load_N = {object = "0x9130:01", unit = "N"}`'
+_LOAD_CURE = (
+    'State object and unit in [devices.load_cells.objects]: `load_N = {{object = "0x9130:{:02X}", unit = "N"}}`'
+)
 _SCALE_CURE = (
     "State newtons per digit, from the bridge amplifier: `load_N = {scale = 0.0125}` in [devices.load_cells.objects]"
 )
@@ -141,7 +143,7 @@ def _cia404(channel: int) -> Profile:
                     Measured(0x7130, channel, LOAD, process_unit(channel)),
                 ),
                 Validity(0x6150, channel, NOT_VALID | 0x06),
-                cure=_LOAD_CURE,
+                cure=_LOAD_CURE.format(channel),
             ),
         ),
         settings=(Setting(0x6112, channel, 1),),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 from typer.testing import CliRunner
 
@@ -11,8 +13,13 @@ from regolithd.daemon.config.configuration import Configuration
 from regolithd.drivers.canopen.nmt import NmtState
 from regolithd.drivers.devices.load_cell import LOAD_CELL
 from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.profiles.identity import identity_entries
+from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.master.events import Identity
 from regolithd.drivers.master.survey import FoundNode
+
+if TYPE_CHECKING:
+    from regolithd.drivers.devices.device import Device
 
 
 def found(device_type: int, vendor: int = 0x9A, revision: int = 1, **fields: object) -> FoundNode:
@@ -36,6 +43,14 @@ def found(device_type: int, vendor: int = 0x9A, revision: int = 1, **fields: obj
 def test_each_node_is_told_what_it_would_need(node: FoundNode, needs: str) -> None:
     """The device profile and the maker decide the line in `rover.toml`."""
     assert describe(node, None, known=False).needs == needs
+
+
+@pytest.mark.parametrize("device", DEVICES, ids=lambda device: device.kind)
+def test_a_device_that_comes_with_regolithd_needs_no_table_of_its_own(device: Device) -> None:
+    """They are what [nodes] means without [devices]; the ground-speed sensor has no CiA profile."""
+    known = identity_entries(device)
+    node = FoundNode(5, Identity(known[0], known[1], known[2], known[3], 1))
+    assert describe(node, None, known=False).needs == f"It would need its id in [nodes] {device.configuration_key}"
 
 
 def test_a_configured_node_is_compared() -> None:

@@ -181,6 +181,18 @@ def test_calibrate_prints_the_procedure_or_writes_the_fit(
     assert (done.exit_code, done.stderr) == (1, "no weights\n")
 
 
+def test_calibrate_says_what_is_wrong_in_rover_toml(tmp_path: Path) -> None:
+    """A current in mA is a line with key and range, and exit status 78; the file stays as it is."""
+    rover = tmp_path / "rover.toml"
+    rover.write_text("[drivetrain]\nno_load_current_A = 37\n")
+    done = regolithd("calibrate", "radius", tmp_path / "drive.csv", "--distance", 5, "--config", rover)
+    said = (
+        f"{rover}:2: drivetrain.no_load_current_A: expected 0 to 5 A, found 37. Change it, or leave it out for 0.0.\n"
+    )
+    assert (done.exit_code, done.stderr) == (78, said)
+    assert rover.read_text().endswith("= 37\n")
+
+
 def test_mismatch_ends_with_65_where_its_files_cannot_be_used(tmp_path: Path) -> None:
     """A recording that is not there, and a simulation that is not TOML (EX_DATAERR)."""
     simulation = tmp_path / "SIM.toml"

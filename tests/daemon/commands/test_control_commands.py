@@ -76,7 +76,7 @@ def answering(monkeypatch: pytest.MonkeyPatch) -> Any:
     return prepare
 
 
-@pytest.mark.parametrize(("ending", "exit_code"), [(Ending.FINISHED, 0), (Ending.STOPPED, 1)])
+@pytest.mark.parametrize(("ending", "exit_code"), [(Ending.FINISHED, 0), (Ending.STOPPED, 1), (Ending.INCOMPLETE, 1)])
 def test_a_traverse_ends_with_its_outcome(answering: Any, ending: Ending, exit_code: int) -> None:
     """Exit status 0 only if the whole distance was driven; the last line has time and distance."""
     daemon = answering(

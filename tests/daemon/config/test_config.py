@@ -56,9 +56,7 @@ port = "1883a"
 """
     found = problems_of(text)
     assert set(found) == {"sync.rate_Hz", "nodes.motors[5]", "wheel.radius_m", "wheel.widht_m", "mqtt.port"}
-    assert found["sync.rate_Hz"].startswith(
-        "rover.toml:2: sync.rate_Hz: expected less than or equal to 200, found 500."
-    )
+    assert found["sync.rate_Hz"].startswith("rover.toml:2: sync.rate_Hz: expected 1 to 200 Hz, found 500.")
     assert found["nodes.motors[5]"].startswith("rover.toml:4: ")
     assert found["wheel.widht_m"].startswith("rover.toml:7: ")
     assert "Did you mean width_m?" in found["wheel.widht_m"]

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 from control_rig import GROUP, LONG, SHORT, Client, Rover, serving
 from hypothesis import given, settings
@@ -67,11 +68,50 @@ async def test_a_traverse_is_driven_and_its_end_is_reported(tmp_path: Path) -> N
         assert accepted.duration_s == pytest.approx(0.8)
         assert isinstance(await client.hear(), Progress)
         end = await client.hear_end()
-        assert (end.ending, end.turned_m) == ("finished", pytest.approx(0.04))
+        assert (end.ending, end.turned_m) == ("finished", pytest.approx(0.04, abs=0.05 * 0.8 / 10))  # measured
     assert rover.told == ["enable", "speed 0.667", "speed 0.000", "disable"]
     noted = Traversed.read(tmp_path)
     assert noted.ending == "finished"
     assert 0.8e9 <= noted.to_ns - noted.from_ns < 20e9
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "shares", "ending", "turned_m", "said"),
+    [
+        (
+            1.0,
+            (1, 1, 0, 1, 1, 1),
+            "quick-stopped",
+            None,
+            "at 0.667 rad/s, and measured: wheel 3 (node 3) at 0.000 rad/s",
+        ),
+        (
+            0.02,
+            (1, 1, 0, 1, 1, 1),
+            "incomplete",
+            0.02 * 5 / 6,
+            "of 0.020 m commanded, only these were measured: wheel 3",
+        ),
+        (0.04, (0.85,) * 6, "incomplete", 0.85 * 0.04, "wheel 6 (node 6) 0.03"),
+    ],
+)
+async def test_wheels_that_do_not_turn_as_commanded_end_it(
+    tmp_path: Path, distance_m: float, shares: tuple[float, ...], ending: str, turned_m: float | None, said: str
+) -> None:
+    """The end names wheel and node, the distance is the measured one, and the problem stays for the alarm."""
+    rover = Rover(shares=np.array(shares))
+    async with serving(tmp_path, rover) as (sink, path):
+        client = await Client.to(path)
+        await client.ask({"command": "traverse", "distance_m": distance_m, "speed_m_s": 0.05})
+        end = await client.hear_end()
+        assert end.ending == ending
+        assert said in end.text
+        assert sink.wheel_problem
+        assert sink.wheel_problem in end.text
+        assert turned_m is None or end.turned_m == pytest.approx(turned_m, abs=0.002)
+        rover.shares = np.ones(6)
+        await client.ask(SHORT)
+        assert not sink.wheel_problem
 
 
 async def test_the_client_that_commanded_it_disconnects(tmp_path: Path) -> None:

@@ -15,6 +15,15 @@ NUMBERS = {
     "client": {"EX_UNAVAILABLE": os.EX_UNAVAILABLE, "EX_NOPERM": os.EX_NOPERM},
     "protocol": {"LINE_LIMIT": 2**16},
     "traverse": {"REPORT_PERIOD_S": 0.5},
+    "wheel_motion": {
+        "TOLERANCE": 0.2,
+        "APPROACH": 0.05,
+        "WINDOW_S": 1,
+        "WINDOW_SNAPSHOTS": 3,
+        "GAP_S": 2.5,
+        "COMPLETE": 0.95,
+        "UNSEEN": 0.9,
+    },
     "server": {"RETRY_S": 5, "MAX_CLIENTS": 64, "_ACCEPTED_AT_A_TIME": 16, "_WAITING_IN_KERNEL": 128},
 }
 

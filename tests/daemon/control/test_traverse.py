@@ -42,6 +42,8 @@ class Rover:
     told: list[object] = field(default_factory=list)
     refuses: dict[str, str] = field(default_factory=dict)
     stands: bool = True
+    problem: str = ""
+    missing: str = ""
 
     async def _do(self, what: str, value: object = None) -> None:
         self.told.append(what if value is None else (what, value))
@@ -65,14 +67,22 @@ class Rover:
         """Record the command to disable."""
         await self._do("disable")
 
-    def watch(self) -> Callable[[], bool]:
+    def commanded(self, wheel_speed_rad_s: float) -> None:
+        """Record nothing: `set_speed` has."""
+
+    def shortfall(self, distance_m: float, speed_m_s: float) -> str:
+        """Return what is missing."""
+        assert (distance_m, speed_m_s) == (10.0, 0.022)
+        return self.missing
+
+    def standstill_detector(self) -> Callable[[], bool]:
         """Return a function that says whether the wheels stand still."""
         return lambda: self.stands
 
 
 def traverse(rover: Rover, clock: Clock, reports: list[float] | None = None) -> Traverse:
     """Return a traverse of Kapvik."""
-    return Traverse(plan(), rover, rover.watch, (reports if reports is not None else []).append, clock)
+    return Traverse(plan(), rover, rover, (reports if reports is not None else []).append, clock)
 
 
 def plan() -> Plan:
@@ -123,6 +133,21 @@ async def test_it_turns_constantly_for_its_time_and_stops_clean() -> None:
     assert clock.now - 100.0 == pytest.approx(454.545454, abs=1e-6)
     assert len(reports) == pytest.approx(910, abs=1)
     assert reports == sorted(reports)
+
+
+async def test_a_wheel_that_does_not_follow_ends_it_by_a_quick_stop() -> None:
+    """The traverse ends when a wheel is measured not to follow, with the reason."""
+    rover, clock = Rover(), QuickClock()
+    clock.at = [(103.0, lambda: setattr(rover, "problem", "wheel 3 at 0.000"))]
+    outcome = await traverse(rover, clock).run()
+    assert outcome == Outcome(Ending.QUICK_STOPPED, pytest.approx(3.5, abs=0.5), "wheel 3 at 0.000")
+    assert rover.told[-2:] == ["quick stop", "disable"]
+
+
+async def test_a_distance_that_was_not_turned_is_not_complete() -> None:
+    """The traverse takes its time, and its end says which wheels have turned less."""
+    outcome = await traverse(Rover(missing="wheel 3"), QuickClock()).run()
+    assert outcome == Outcome(Ending.INCOMPLETE, pytest.approx(plan().duration_s), "wheel 3")
 
 
 async def interrupted(rover: Rover, *, quick: bool) -> Outcome:

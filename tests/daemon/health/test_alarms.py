@@ -34,6 +34,7 @@ TROUBLES = [
     ("recording_problem", "no room", "recording", Severity.ERROR),
     ("recording_short", True, "recording", Severity.WARNING),
     ("control_problem", "no such group", "control", Severity.WARNING),
+    ("wheel_problem", "wheel 3 (node 3) at 0.000", "wheel", Severity.ERROR),
     ("broker_problem", "connection refused", "broker", Severity.WARNING),
     ("model_problem", "no such file", "model", Severity.ERROR),
     ("undecodable", ("wrong-length of node 13",), "undecodable", Severity.WARNING),

@@ -206,13 +206,14 @@ def test_alarm_inputs_come_from_every_part(service: Any, clock: Clock) -> None:
         service,
         Publisher(report),  # type: ignore[arg-type]
         control_problem=lambda: "no group",
+        wheel_problem=lambda: "wheel 3",
         monotonic_ns=clock,
     )
     found = sink._alarm_inputs()
     assert (found.store_dropped, found.store_unstored, found.store_damaged, found.store_torn) == (1, 2, 3, 4)
     assert (found.bus_state, found.kernel_drops, found.bus_problem) == (BusState.PASSIVE, 4, "")
     assert (found.recording_problem, found.recording_remedy, found.recording_short) == ("no room", "free some", True)
-    assert found.control_problem == "no group"
+    assert (found.control_problem, found.wheel_problem) == ("no group", "wheel 3")
     service.network = service.recorder = None
     empty = sink._alarm_inputs()
     assert (empty.bus_state, empty.kernel_drops, empty.recording_problem, empty.nodes) == (BusState.ACTIVE, 0, "", {})

@@ -233,6 +233,16 @@ async def test_check_and_ground_say_the_same(
         await until(lambda: "requires a client certificate" in subscription.problem)
 
 
+async def test_check_names_the_certificate_that_is_accepted(
+    start: Callable[[str], Mosquitto], issued: Issued, tmp_path: Path
+) -> None:
+    """A broker that requires a client certificate does not accept anyone."""
+    settings = mqtt(start(secured(issued.ours, issued.broker)), issued, issued.kapvik)
+    (finding,) = await check_broker(Configuration(mqtt=Mqtt(spool_directory=tmp_path, **settings)))
+    assert finding.verdict == "good"
+    assert f"accepts the holder of {issued.kapvik.path}, TLS" in finding.text
+
+
 FILES = {
     "absent ca_file": ({"ca_file": "absent.pem"}, "absent.pem is not there. Write it, or correct [mqtt] ca_file"),
     "a folder as cert_file": ({"cert_file": "."}, "is a folder. Name a file in [mqtt] cert_file"),

@@ -65,6 +65,14 @@ def test_a_recording_replays_where_its_eds_files_are_not(tmp_path: Path) -> None
     assert found.eds.name == "mine.eds"
 
 
+def test_the_text_of_an_eds_file_is_recorded_whatever_its_encoding(tmp_path: Path) -> None:
+    """A file in UTF-16 is in the metadata as text, with the objects that it had."""
+    configuration = described(tmp_path)
+    text = (tmp_path / "mine.eds").read_text()
+    (tmp_path / "mine.eds").write_text(text, encoding="utf-16")
+    assert list(eds_metadata(configuration).values()) == [text]
+
+
 def test_without_the_file_and_its_text_there_is_one_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A recording without the text says which file is missing, with exit status 78."""
     configuration = described(tmp_path)

@@ -8,9 +8,9 @@ from canopen.sdo import SdoAbortedError
 
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.canopen import cob_id
+from regolithd.drivers.canopen.eds import STRUCT_CODES
 from regolithd.drivers.canopen.emcy import emergency_frame, error_text, parse, register_bits
 from regolithd.drivers.canopen.nmt import NmtCommand, NmtState, command_frame, parse_state, state_frame
-from regolithd.drivers.canopen.object_dictionary import STRUCT_CODES
 from regolithd.drivers.canopen.sdo import ABORT_TEXTS, abort_request, abort_text
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 

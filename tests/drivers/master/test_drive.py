@@ -41,9 +41,9 @@ class Bus:
 class Objects:
     """The objects of one drive, as its SDO client reads and writes them; statuswords come in turn, the last stays."""
 
-    def __init__(self, *statuswords: int, mode: int = 3, error_code: int = 0) -> None:
+    def __init__(self, *statuswords: int, mode: int = 3, error_code: int = 0, limit: int | None = None) -> None:
         self.statuswords = list(statuswords)
-        self.values = {0x6061: mode, 0x603F: error_code}
+        self.values = {0x6061: mode, 0x603F: error_code, 0x607F: limit}
         self.writes: list[tuple[int, bytes]] = []
 
     async def read_number(self, index: int, subindex: int = 0, *, signed: bool = False) -> int:
@@ -52,7 +52,10 @@ class Objects:
         assert signed == (index == 0x6061)
         if index == 0x6041:
             return self.statuswords.pop(0) if len(self.statuswords) > 1 else self.statuswords[0]
-        return self.values[index]
+        value = self.values[index]
+        if value is None:
+            raise SdoAbortError(0x06020000, "object does not exist", node_id=4, index=index, subindex=0)
+        return value
 
     async def write(self, index: int, subindex: int, data: bytes) -> None:
         """Keep what is written."""
@@ -223,6 +226,20 @@ async def test_a_wheel_speed_is_multiplied_by_the_gear_ratio() -> None:
     assert rover.motion.moving
     await rover.motion.set_speed((0.0, 0.0))
     assert not rover.motion.moving
+
+
+async def test_a_speed_that_a_drive_does_not_reach_is_refused_before_anything_is_sent() -> None:
+    """Its object 0x607F counts, where it has one and it is not 0; the drives are named, with the highest speeds."""
+    rover = Rover(ENABLED)
+    rover.objects[1].values[0x607F] = 0
+    rover.objects[2].values[0x607F] = 600
+    await rover.motion.enable()
+    await rover.motion.set_speed((rad_s(9000) / 100, rad_s(-600) / 100))
+    assert len(rover.bus.frames) == 2
+    too_fast = r"turn at 94\.2 rad/s, more than object 0x607F allows \(node 2 62\.8 rad/s\)\. Choose at most 66 % of"
+    with pytest.raises(DriveError, match=too_fast):
+        await rover.motion.set_speed((rad_s(900) / 100, rad_s(-900) / 100))
+    assert len(rover.bus.frames) == 2
 
 
 def rad_s(rpm: float) -> float:

@@ -49,9 +49,9 @@ class Chooser:
         alone = [place for place in self.places if len(place.units.rovers) == 1]
         searches = [self.places, alone] if 0 < len(alone) < len(self.places) else [self.places]
         found = [self._grown(start, places) for places in searches for start in self._starts(places)]
-        return self._confirmed(max(found, key=self._evidence))
+        return self._confirmed(max(found, key=self.evidence))
 
-    def _evidence(self, fit: FleetFit) -> float:
+    def evidence(self, fit: FleetFit) -> float:
         """Return the score of a fit less what its effects had to gain to enter."""
         return score(self.equations, fit) - self.entry_threshold * len(fit.terms)
 
@@ -82,7 +82,7 @@ class Chooser:
         index = 0
         while index < len(fit.terms):
             less = self.equations.fit(without(fit, index))
-            if self._worthwhile(less, self.equations.fit((*less.terms, fit.terms[index]))):
+            if self.worthwhile(less, self.equations.fit((*less.terms, fit.terms[index]))):
                 index += 1
             else:
                 fit, index = less, 0
@@ -95,11 +95,11 @@ class Chooser:
             if gained <= needed:
                 return None
             more = self.equations.fit((*fit.terms, term))
-            if self.acceptable(more) and self._worthwhile(fit, more):
+            if self.acceptable(more) and self.worthwhile(fit, more):
                 return more
         return None
 
-    def _worthwhile(self, less: FleetFit, more: FleetFit) -> bool:
+    def worthwhile(self, less: FleetFit, more: FleetFit) -> bool:
         """Return whether the last effect gains enough beside those on the same rovers: no law is exact.
 
         Of a delay counts what the last effect can hold of its misfit (`law_misfit.explained_beside`).
@@ -168,6 +168,10 @@ class Chooser:
         """Return whether every coefficient has its sign, every effect is large enough, and each law has one shape."""
         one_shape = all(_one_shape(*pair) for pair in combinations(fit.terms, 2))
         return one_shape and all(self.acceptable_term(fit, index) for index in range(len(fit.terms)))
+
+    def stands(self, fit: FleetFit) -> bool:
+        """Return whether every effect may be named, and recordings that did not fit it confirm it."""
+        return self.acceptable(fit) and len(self._confirmed(fit).terms) == len(fit.terms)
 
     def acceptable_term(self, fit: FleetFit, index: int) -> bool:
         """Return whether an effect has its signs, is large enough, and on each rover whose size is its own certain."""

@@ -58,6 +58,7 @@ def fleet_report(answer: FleetAnswer, evidence: FleetEvidence, provenance: Fleet
         verdict=verdict_sentence(answer, labels),
         wheels=plural(labels.wheel),
         summary=sections.summary(answer, labels, wheels),
+        certainty=of_one.certainty(answer, labels),
         period=sections.period(answer),
         season=Markup(season_figure(lanes, season)),  # noqa: S704  # texts are escaped
         not_drawn=len(answer.rovers) - len({lane.rover for lane in lanes}),

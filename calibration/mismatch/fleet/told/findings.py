@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import FitImprovement, Parameter
+from regolithd.calibration.mismatch.fleet.choice.alternatives import other_choices
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
@@ -24,6 +25,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
 from regolithd.calibration.mismatch.fleet.told.sizes import parameters_of, size_with_std
+from regolithd.calibration.mismatch.inference.other_answers.probability import other_answers, probability
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.prior import parted_own_name
 from regolithd.calibration.mismatch.problem.problem import LeftOut
@@ -115,8 +117,8 @@ class Chosen:
         return Beside.of(self.equations, self.fit, self.shown.terms)
 
 
-def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
-    """Return the answer of one channel."""
+def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
+    """Return the answer of one channel of so many."""
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
     held_out = held_out_squares(equations, fit)
     shown, beside = chosen.shown, chosen.beside
@@ -129,6 +131,9 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     floor = _noise_floor(chosen)
     counts = equations.counts
     before, after = (_rms(squares, counts) for squares in (held_out.before, held_out.after))
+    # What single recordings show was decided by each alone, and is no choice among the names of all.
+    others = None if single or rest else other_choices(chosen.chooser, fit)
+    limits = replace(THRESHOLDS, highest_probability=THRESHOLDS.highest_season_probability ** (1 / channels))
     return FleetAnswer(
         verdict=verdict,
         effects=(*effects, *single),
@@ -138,6 +143,8 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
         fit=FitImprovement(simulation.channel, before, after if fit.terms else before, floor),
         parameters=parameters,
         left_out=_left_out(chosen),
+        probability=None if others is None else probability(others, limits),
+        alternatives=other_answers(others or (), limits),
         notes=_notes(chosen),
         rovers=tuple(_rover(chosen, rover) for rover in range(len(chosen.names.rovers))),
     )

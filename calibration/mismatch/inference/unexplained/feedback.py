@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.inference.uncertainty.sandwich import block_
 from regolithd.calibration.mismatch.problem.covariates import FOLLOW_SPEED
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import same_course
 from regolithd.calibration.mismatch.regression.likelihood.as_read import left_beside
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.selection.cross_validation import training_equations
@@ -74,10 +75,18 @@ def notes_of_feedback(problem: Problem) -> tuple[str, ...]:
     """Return a note for each covariate that has no curve because it follows the reading's noise."""
     return tuple(
         f"{capital(word_for(covariate, problem.labels))} follows the noise of the reading of "
-        f"{problem.simulation.channel}, as the output of a controller that acts on that reading does. What else would "
-        f"act by quick changes of it alone cannot be told apart from that: hold it still, or record another sensor."
+        f"{problem.simulation.channel}, {_why_fed_back(problem, covariate)}. What else would act by quick changes of "
+        f"it alone cannot be told apart from that: hold it still, or record another sensor."
         for covariate in sorted(problem.fed_back)
     )
+
+
+def _why_fed_back(problem: Problem, covariate: str) -> str:
+    """Return what a covariate is that follows a reading's noise: an input whose own error is a part of that, or not."""
+    values, inputs = problem.covariates[covariate], problem.smoothed
+    if any(same_course(values, inputs[name], problem.mask) for name in inputs if name != problem.simulation.channel):
+        return "as an input does whose own error is a part of that noise"
+    return "as the output of a controller that acts on that reading does"
 
 
 def _is_fed_back(decision: Decision, covariate: str) -> bool:

@@ -155,7 +155,7 @@ def _as_it_acts(decision: Decision) -> list[_Courses]:
     for index in range(len(decision.named.terms)):
         explained += contribution(equations, decision.named, index)
     if (reliability := equations.design.reliability) is not None:  # where readings scatter more, their mean is no spell
-        left, explained = (each * equations.design.in_time(reliability) for each in (left, explained))
+        left, explained = (each * equations.design.in_time(reliability.in_means) for each in (left, explained))
     direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
     ways = (np.ones(left.shape), direction) if np.ptp(direction[problem.mask]) else (direction,)
     as_it_acts = [_Courses(problem, left, explained, along) for along in ways]

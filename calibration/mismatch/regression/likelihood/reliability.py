@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.design_matrix import Reliability
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.noise_models.variance_components import variance_components
 from regolithd.calibration.mismatch.signal.robust import robust_std
@@ -37,8 +38,8 @@ FURTHEST_STEP = 6.0
 input is set, it does for other reasons)."""
 
 
-def reliability_of(design: DesignMatrix, residual: Array) -> Single | None:
-    """Return by what readings are multiplied to scatter alike, shape (wheel, time in the order of folds).
+def reliability_of(design: DesignMatrix, residual: Array) -> Reliability | None:
+    """Return by what readings are multiplied to scatter alike.
 
     `residual` [time, wheel] shows which share of the doubt is true. None where they scatter alike, or hardly any does
     not.
@@ -46,10 +47,11 @@ def reliability_of(design: DesignMatrix, residual: Array) -> Single | None:
     problem = design.problem
     if problem.doubt is None and problem.noise_size is None:
         return None
-    _, found = _by_doubt(design, design.in_folds(residual))
+    found = _by_doubt(design, design.in_folds(residual))
     if problem.noise_size is not None:
-        found /= np.maximum(design.in_folds(problem.noise_size), 1.0)
-    kept = np.concatenate([found[wheel, at] for wheel, (at, _) in enumerate(design.readings)])
+        growth = np.maximum(design.in_folds(problem.noise_size), 1.0).astype(np.float32)
+        found = Reliability(found.alone / growth, found.in_means / growth)
+    kept = np.concatenate([found.in_means[wheel, at] for wheel, (at, _) in enumerate(design.readings)])
     return found if 1 - np.mean(kept**2) > LEAST_LOST or kept.min(initial=1.0) < LEAST_RELIABILITY else None
 
 
@@ -63,7 +65,7 @@ def noise_size_of(equations: NormalEquations, fit: Fit) -> Array | None:
     if problem.arbitrary_zero:
         return None
     left = design.in_folds(residual_of(equations, fit))
-    left = left * _by_doubt(design, left)[0]
+    left = left * _by_doubt(design, left).alone
     size = design.in_folds(problem.filled) ** 2
     found, lost = np.ones(problem.mask.shape), 0.0
     for wheel, (at, runs) in enumerate(design.readings):
@@ -79,12 +81,12 @@ def noise_size_of(equations: NormalEquations, fit: Fit) -> Array | None:
     return found if lost > LEAST_LOST else None
 
 
-def _by_doubt(design: DesignMatrix, left: Array) -> tuple[Single, Single]:
-    """Return the factors for what the inputs' stated errors add to each reading alone, and to a mean of many."""
+def _by_doubt(design: DesignMatrix, left: Array) -> Reliability:
+    """Return the factors for what the inputs' stated errors add."""
     doubt, shape = design.problem.doubt, left.shape
     each, many = np.ones(shape, np.float32), np.ones(shape, np.float32)
     if doubt is None:
-        return each, many
+        return Reliability(each, many)
     alone, together = (design.in_folds(values) for values in (doubt.alone, doubt.together))
     places = [places for places, _ in design.readings]
     squares, known = ([values[wheel, at] for wheel, at in enumerate(places)] for values in (left**2, alone))
@@ -93,7 +95,7 @@ def _by_doubt(design: DesignMatrix, left: Array) -> tuple[Single, Single]:
         if level > 0:
             each[wheel, at] = np.sqrt(level / (level + share * alone[wheel, at]))
             many[wheel, at] = np.sqrt(level / (level + share * together[wheel, at]))
-    return each, many
+    return Reliability(each, many)
 
 
 def _std_of_share(known: Array, variances: Array) -> float:

@@ -21,6 +21,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import fleet_answer_schema
 from regolithd.calibration.mismatch.fleet.work.found import Found
 from regolithd.calibration.mismatch.fleet.work.store import Store
 from regolithd.calibration.mismatch.fleet.work.workers import DaskCluster, ThisProcess
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 from regolithd.calibration.validation.fleet_study.__main__ import largest_difference
 
 if TYPE_CHECKING:
@@ -207,8 +208,11 @@ def test_the_size_in_each_recording_follows_the_wear(fleet: FleetComparison) -> 
 def test_an_effect_of_all_rovers_is_one_effect(tmp_path: Path) -> None:
     """All rovers share it, although no single recording would need to show it."""
     drives: list[Mapping[str, Any]] = [{"coulomb": (0.05, 0.05)}] * 2
-    (effect,) = compared(tmp_path, {"a": drives, "b": drives}).answer.effects
+    answer = compared(tmp_path, {"a": drives, "b": drives}).answer
+    (effect,) = answer.effects
     assert (effect.name, effect.rovers, effect.since) == ("coulomb-friction", ("a", "b"), None)
+    assert answer.probability is not None
+    assert 0.5 < answer.probability <= THRESHOLDS.highest_season_probability
     assert effect.parameters["coulomb_current"].low < 0.05 < effect.parameters["coulomb_current"].high
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -11,7 +12,7 @@ from linear_machine import CANDIDATES, NOISE, equations_of, problem_of, table, t
 
 from regolithd.calibration.mismatch import Candidate, Coefficient, Problem, Shape
 from regolithd.calibration.mismatch.inference import held_out
-from regolithd.calibration.mismatch.inference.held_out import chosen_effects, held_out_errors
+from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, chosen_effects, held_out_errors
 from regolithd.calibration.mismatch.selection.best_subsets import optimised_shapes
 
 
@@ -120,3 +121,10 @@ def test_two_answers_that_are_ahead_of_each_other_end_the_search(monkeypatch: py
     first: Any = answers["one"]
     found, _ = held_out.confirmed_beside_curves(first, ())
     assert found is answers["other"]
+
+
+def test_effects_that_cancel_each_other_gain_nothing_together() -> None:
+    """Each lowers the error that the other makes: the one that lowers it less is the next to go."""
+    together = HeldOutErrors(before=1.0, after=1.0, without=(1.3, 1.2), with_it=(1.0, 1.0), whole=1.0)
+    assert together.without_gain() == 1
+    assert replace(together, after=0.9).without_gain() is None

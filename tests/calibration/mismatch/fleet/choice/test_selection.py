@@ -267,8 +267,8 @@ def test_a_further_effect_must_gain_a_share_of_the_others_on_its_rovers() -> Non
     beside, elsewhere = (of.fit((*large.terms, term(WAVE, Course("always"), rovers=(n,)))) for n in (0, 1))
     gained = beside.delta_chi2 - large.delta_chi2
     assert 10 * ENTRY < gained < 0.01 * large.delta_chi2
-    assert not chooser(of)._worthwhile(large, beside)
-    assert chooser(of)._worthwhile(large, elsewhere)
+    assert not chooser(of).worthwhile(large, beside)
+    assert chooser(of).worthwhile(large, elsewhere)
 
 
 def test_every_fifth_recording_of_a_rover_is_in_the_same_fold() -> None:

@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.inference.other_answers.probability import (
     probability,
 )
 from regolithd.calibration.mismatch.regression.groups.smooth_groups import with_smooth_terms
-from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
+from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_candidate, best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import Decision, Intermittent, decide
 from regolithd.calibration.mismatch.selection.plausibility.released_parameters import OtherStatement
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
@@ -154,6 +154,16 @@ def test_an_answer_is_no_more_probable_than_one_that_held_out_readings_refused()
     assert probability(with_refused(nothing), THRESHOLDS) <= 0.5 * HIGHEST
     weaker = replace(found, refused=frozenset({frozenset(alternatives(found)[0].effects)}))
     assert with_refused(weaker)[0].margin == alternatives(found)[0].margin
+
+
+def test_one_other_name_is_an_answer_beside_two() -> None:
+    """What two names imitate has a name of its own, although no name is shared."""
+    right = decided(factor=0.05)
+    assert [term.name for term in right.whole.terms] == ["power"]
+    best = {term.name: term for _, term in best_of_each_candidate(right.equations, ())}
+    two = right.equations.fit((best["offset"], best["step"]))
+    others = alternatives(replace(right, named=two, whole=two))
+    assert ("power",) in {other.effects for other in others}
 
 
 def test_the_lead_of_a_term_is_over_the_answer_without_it(monkeypatch: pytest.MonkeyPatch) -> None:

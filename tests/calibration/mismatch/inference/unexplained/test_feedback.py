@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy.signal import lfilter
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.inference.unexplained.feedback import notes_of_feedback
+from regolithd.calibration.mismatch.problem.build import build_problem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -81,6 +84,17 @@ def test_the_note_says_what_cannot_be_told_apart() -> None:
     (told, *_) = [note for each in notes for note in each if "controller" in note]
     assert told.startswith("Duty follows the noise of the reading of temperature_degC")
     assert "record another sensor" in told
+
+
+def test_an_input_that_has_an_error_is_told_as_no_controller() -> None:
+    """What was smoothed for its error follows the noise that this error adds."""
+    recording = heated(0, acts_on_noise=0.0)
+    problem = replace(build_problem(recording, Chamber()), fed_back=frozenset({"duty"}))
+    (of_controller,) = notes_of_feedback(problem)
+    (of_input,) = notes_of_feedback(replace(problem, smoothed={"duty_pct": recording.channels["duty_pct"]}))
+    assert "controller" in of_controller
+    assert "own error" in of_input
+    assert "controller" not in of_input
 
 
 def quickly_heated(seed: int) -> Recording:

@@ -117,7 +117,7 @@ def test_readings_in_doubt_weigh_less() -> None:
     left = residual_of(equations, fit_of_significant_terms(equations))
     design = whitened(equations, left).design
     assert design.reliability is not None
-    weight = design.in_time(design.reliability)
+    weight = design.in_time(design.reliability.in_means)
     wheel = problem.recording.channels["wheel_m_s"]
     assert np.mean(weight[wheel < 0.05]) < 0.5 * np.mean(weight[wheel > 0.22])
     column = problem.tangent("stiffness_A")

@@ -101,5 +101,5 @@ def test_one_reading_in_great_doubt_is_no_evidence() -> None:
     doubtful = replace(problem, doubt=InputDoubt(doubt, doubt, none, np.zeros((0, *doubt.shape))))
     factors = reliability_of(smooth_equations(doubtful).design, residual)
     assert factors is not None
-    least, *others = np.sort(factors.ravel())
+    least, *others = np.sort(factors.in_means.ravel())
     assert least < LEAST_RELIABILITY < others[0]
