@@ -22,7 +22,7 @@ def check_recordings(rig: Rig) -> tuple[int, int]:
         gaps: list[str] = []
         messages = sum(1 for _ in read_messages(path, on_gap=gaps.append))
         rig.check(not gaps, f"{path.name}: {gaps}")
-        # The oldest log may have been deleted, to make room, before its MCAP file.
+        # A daemon may be killed after it deleted the oldest log, to make room, and before it deleted its MCAP file.
         if messages and path.with_suffix(".log").exists() and begins_a_run(path):
             compared += replays(rig, path)
     return len(paths), compared

@@ -48,7 +48,7 @@ def run(*command: str | Path, check: bool = True, text: str | None = None) -> su
 
 def journal(unit: str = "regolithd") -> str:
     """Return the last lines of a unit's journal."""
-    command = ["journalctl", "--no-pager", "--output=short-monotonic", "--lines=60", "--unit", unit]
+    command = ["journalctl", "--no-pager", "--output=short-monotonic", "--lines=200", "--unit", unit]
     return subprocess.run(command, check=False, capture_output=True, text=True).stdout
 
 

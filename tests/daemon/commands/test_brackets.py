@@ -71,7 +71,9 @@ def test_a_file_is_named_whole_while_it_is_read(tmp_path: Path, monkeypatch: pyt
     """A name may have square brackets."""
     path, screen = tmp_path / "drive[old].log", io.StringIO()
     path.write_text("line\n" * 1000)
-    monkeypatch.setattr(progress, "terminal", lambda **_: Console(file=screen, force_terminal=True, width=100))
+    monkeypatch.setattr(
+        progress, "terminal", lambda **_: Console(file=screen, force_terminal=True, width=100, color_system=None)
+    )
     with progress.open_text(path) as lines:
         assert len(list(lines)) == 1000
     assert "drive[old].log" in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
