@@ -78,7 +78,7 @@ def demo_configuration(folder: Path, temporary: Path, port: int) -> Configuratio
             "nodes": {"inclinometer": 21, "ground_speed": 22, "motor_diagnostics": True},
             "drivetrain": drivetrain,
             "posterior": {"window_s": WINDOW_S},
-            "recording": {"directory": folder, "limit_MB": 50},
+            "recording": {"directory": folder, "limit_MB": 500},
             "mqtt": {"host": "127.0.0.1", "port": port, "spool_directory": temporary / "spool"},
             "control": {"socket": temporary / "control.sock", "group": str(os.getgid())},
         }
