@@ -5,10 +5,11 @@ BIN := $(VENV)/bin
 DEMO := $(VENV)/demo.ready
 DEV := $(VENV)/dev.ready
 export PYTHON WHEELHOUSE PYTHON_VERSION
+MAKEFLAGS += --jobs=2 # what `test` needs is installed side by side
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: help demo test check docs clean install uninstall
+.PHONY: help demo test test-packages check docs clean install uninstall
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines slow-noise reliability real scaling thresholds mutations mutants frames pictures picture screenshots
@@ -22,9 +23,11 @@ help:
 demo: $(DEMO) ## a virtual rover drives onto weak soil, then a comparison with a simulation; two minutes, no root
 	$(BIN)/regolithd demo
 
-test: $(DEV) ## all tests and checks (installs Debian packages for some of them, where permitted)
-	.ci/test-packages
+test: $(DEV) test-packages ## all tests and checks (installs Debian packages for some of them, where permitted)
 	.ci/all-tests $(BIN)/python
+
+test-packages:
+	.ci/test-packages
 
 check: $(DEV) ## lint, format, types and import rules alone
 	$(BIN)/ruff check

@@ -307,7 +307,7 @@ def test_the_demo_is_configured_for_one_process(tmp_path: Path) -> None:
     assert configuration.drivetrain.no_load_current_std_A == (0.001,) * 6
     assert min(configuration.drivetrain.no_load_current_A) > 0
     assert configuration.posterior.window_s == 8.0
-    assert (configuration.recording.directory, configuration.recording.limit_MB) == (tmp_path / "out", 50)
+    assert (configuration.recording.directory, configuration.recording.limit_MB) == (tmp_path / "out", 500)
     assert (configuration.mqtt.host, configuration.mqtt.port) == ("127.0.0.1", 1883)
     assert configuration.mqtt.spool_directory == tmp_path / "temporary" / "spool"
     assert configuration.control.socket == tmp_path / "temporary" / "control.sock"
