@@ -17,7 +17,6 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_smooth_term,
     entry_cost,
     optimised_shapes,
-    passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.by_region.region_search import schwarz_surcharge
 from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED, answer_names
@@ -157,24 +156,12 @@ def _admissible(decision: Decision, fit: Fit) -> bool:
     curves = [term for term in fit.terms if not term.group.named]
     return (
         acceptable(equations, fit)
-        and _enough_for_more_names(decision, fit)
         and (not curves or not _is_a_laws_misfit(decision, fit, named, curves[-1]))
         and (not curves or _is_large(decision, named, curves[-1]))
         and all(len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves)
         and len(drop_what_a_changed_parameter_explains(equations, named).terms) == len(named.terms)
         and len(drop_what_pulls_parameters_out(equations, named).terms) == len(named.terms)
     )
-
-
-def _enough_for_more_names(decision: Decision, fit: Fit) -> bool:
-    """Return whether a set gains what a further effect must, where it has the answer's effects and more.
-
-    Two names in the place of a curve are no further ones.
-    """
-    extra = len(fit.terms) - len(decision.whole.terms)
-    more = extra > 0 and all(term.group.named for term in fit.terms)
-    more = more and (bool(decision.named.terms) or not decision.unnamed)
-    return not more or passes_entry_test(decision.equations, fit, decision.whole, decision.entry_threshold)
 
 
 def _is_large(decision: Decision, named: Fit, curve: Term) -> bool:

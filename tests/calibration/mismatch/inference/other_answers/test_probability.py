@@ -156,6 +156,18 @@ def test_an_answer_is_no_more_probable_than_one_that_held_out_readings_refused()
     assert with_refused(weaker)[0].margin == alternatives(found)[0].margin
 
 
+def test_an_effect_that_just_misses_its_entry_is_another_answer() -> None:
+    """It is behind by what it lacks, so that nothing is told with less certainty than where nothing comes near."""
+    for size in (0.1, 0.09, 0.08, 0.07, 0.06):
+        decision = decided(drag=size, noise=0.8)
+        if not decision.whole.terms:
+            break
+    assert decision.whole.terms == ()
+    (drag,) = (other for other in alternatives(decision) if other.effects == ("drag",))
+    assert 0 < drag.margin < decision.entry_threshold
+    assert probability(alternatives(decision), THRESHOLDS) < HIGHEST - 0.01
+
+
 def test_one_other_name_is_an_answer_beside_two() -> None:
     """What two names imitate has a name of its own, although no name is shared."""
     right = decided(factor=0.05)
