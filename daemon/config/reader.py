@@ -80,7 +80,7 @@ def parse_configuration(text: str, path: Path) -> Configuration:
 
 def missing_files(configuration: Configuration, path: Path) -> list[Problem]:
     """Return a problem for each file that `[mqtt]` of this rover.toml names, and that is not there."""
-    return list(_problems_together(missing_credentials(configuration.mqtt), path.read_text(encoding="utf-8"), path))
+    return list(_problems_together(missing_credentials(configuration.mqtt), path.read_text(encoding="utf-8-sig"), path))
 
 
 def read_tables(path: Path, model: type[Model], checks: Checks[Model]) -> Model:

@@ -41,9 +41,8 @@ _OF_EVENT: dict[type[NetworkEvent], int] = {
 }
 
 _log = logging.getLogger(__name__)
-_log.addHandler(
-    logging.NullHandler()
-)  # `run` sets logging up; a program that does not, `demo`, has a screen of its own
+# `run` sets logging up; a program that does not, `demo`, has a screen of its own.
+_log.addHandler(logging.NullHandler())
 
 
 class AlarmLog:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
-from regolithd.calibration.mismatch.problem.inputs.input_doubt import bias_of, without_error_of_derivatives
+from regolithd.calibration.mismatch.problem.inputs.between_readings import doubts_by_moved
+from regolithd.calibration.mismatch.problem.inputs.input_doubt import bias_of, total_doubt, without_error_of_derivatives
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.problem.readings.compared import blanks_of, left_out
@@ -59,11 +60,15 @@ def build_problem(
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
     inputs = inputs or inputs_of(recording, simulation, thresholds)
     all_values = {**simulation.variants(), **chosen}
-    on_time = put_on_time(inputs, simulation, all_values, late, late_on or {}) if late else inputs
-    run = simulated(on_time, simulation, all_values, thresholds)
-    as_recorded = None
+    run = simulated(put_on_time(inputs, late, late_on or {}) if late else inputs, simulation, all_values, thresholds)
+    as_recorded, doubt = None, inputs.doubt
     if late:
-        as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values) + bias_of(inputs.doubt)
+
+        def predict(others: Mapping[str, Array]) -> Array:
+            return simulation.predict(others, all_values) + bias_of(inputs.doubt)
+
+        doubt = total_doubt((doubt, *doubts_by_moved(run.recording, predict, run.prediction, late, late_on or {})))
+        as_recorded = predict(complete_inputs(inputs.expected))
         as_recorded = np.where(np.isfinite(as_recorded), as_recorded, run.prediction)
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed
@@ -114,7 +119,7 @@ def build_problem(
         row=simulation.row(recording.wheels),
         left_out=not_compared,
         thresholds=thresholds,
-        doubt=on_time.doubt,
+        doubt=doubt,
         on_time=dict(late or {}),
         on_time_on=dict(late_on or {}),
         as_recorded=as_recorded,

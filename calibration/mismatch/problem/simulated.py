@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
-from regolithd.calibration.mismatch.problem.inputs.between_readings import doubt_by_slower, doubts_by_moved
+from regolithd.calibration.mismatch.problem.inputs.between_readings import doubt_by_slower
 from regolithd.calibration.mismatch.problem.inputs.errors_in_variables import ExpectedInputs, smoothed_inputs
 from regolithd.calibration.mismatch.problem.inputs.exact_covariates import given_exact_covariates
 from regolithd.calibration.mismatch.problem.inputs.input_doubt import (
@@ -194,17 +194,10 @@ def _carries_over_gaps(
     return bool(carried_over_gaps(recording, np.isfinite(predicted()) & (moved != predicted())).any())
 
 
-def put_on_time(
-    inputs: Inputs,
-    simulation: Predictor,
-    values: Mapping[str, float],
-    late: Mapping[str, float],
-    on: Mapping[str, tuple[int, ...]],
-) -> Inputs:
+def put_on_time(inputs: Inputs, late: Mapping[str, float], on: Mapping[str, tuple[int, ...]]) -> Inputs:
     """Return the inputs with some of their columns as they would have been recorded without their delay [s].
 
     What they were at the end of each run was not recorded any more. `on` has the wheels of those that are late on some.
-    The simulation with these `values` tells what is uncertain between two readings.
     """
 
     def moved(recording: Recording) -> Recording:
@@ -221,14 +214,12 @@ def put_on_time(
     }
     for name, delay in late.items():
         blanks[name] = blanks.get(name, False) | beyond_the_end(inputs.expected, delay, on.get(name, ()))
-    expected = moved(inputs.expected)
     return replace(
         inputs,
         as_read=moved(inputs.as_read),
-        expected=expected,
+        expected=moved(inputs.expected),
         bridged_otherwise=otherwise,
         blanks=blanks,
-        doubt=total_doubt((inputs.doubt, *doubts_by_moved(expected, simulation, values, late, on))),
         otherwise_in_gaps=in_gaps,
     )
 

@@ -28,7 +28,7 @@ def other_choices(chooser: Chooser, fit: FleetFit) -> tuple[Alternative, ...]:
     for trial in _neighbours(chooser, fit):
         names = _names(trial)
         margin = max(evidence - chooser.evidence(trial), 0.0)
-        if names != told and margin < min(LARGEST_MARGIN, best.get(names, LARGEST_MARGIN)) and chooser.stands(trial):
+        if names != told and margin < best.get(names, LARGEST_MARGIN) and chooser.stands(trial):
             best[names] = margin
     found = [Alternative(names, margin) for names, margin in best.items()]
     return tuple(sorted(found, key=lambda other: other.margin))

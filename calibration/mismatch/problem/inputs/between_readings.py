@@ -57,25 +57,21 @@ def doubt_by_slower(
 
 def doubts_by_moved(
     moved: Recording,
-    simulation: Predictor,
-    values: Mapping[str, float],
+    predict: Callable[[Mapping[str, Array]], Array],
+    predicted: Array,
     late: Mapping[str, float],
     on: Mapping[str, Sequence[int]],
 ) -> list[InputDoubt]:
-    """Return how uncertain the prediction is by each input that was put on time by so much [s], on these wheels.
+    """Return how uncertain a prediction is by each input that was put on time by so much [s], on these wheels.
 
-    One run of the simulation for each, and one more.
+    `predict` runs the simulation on other inputs, once for each, and `predicted` is what it says of these.
     """
-    inputs = complete_inputs(moved)
-    shares = {name: (delay / moved.step_s) % 1.0 for name, delay in late.items()}
-    off = {name: _drawn_off(inputs[name], share, on.get(name, ())) for name, share in shares.items()}
-    if not any(each.any() for each in off.values()):
-        return []
-    before = simulation.predict(inputs, values)
-    found = []
-    for name, each in off.items():
-        changed = np.nan_to_num(simulation.predict({**inputs, name: inputs[name] + each}, values) - before)
-        found.append(_doubt(changed, changed**2 * wheels_in_common(inputs[name])))
+    inputs, found = complete_inputs(moved), []
+    for name, delay in late.items():
+        off = _drawn_off(inputs[name], (delay / moved.step_s) % 1.0, on.get(name, ()))
+        if off.any():
+            changed = np.nan_to_num(predict({**inputs, name: inputs[name] + off}) - predicted)
+            found.append(_doubt(changed, changed**2 * wheels_in_common(inputs[name])))
     return found
 
 

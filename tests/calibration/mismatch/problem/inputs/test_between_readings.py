@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,9 @@ from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.inputs.between_readings import doubts_by_moved
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 COUNT = 900
 FINE = 10
@@ -44,10 +49,15 @@ def recorded(delay_s: float, seed: int = 1, noise: float = 0.05) -> dict[str, np
 def test_where_an_input_steps_its_value_on_time_is_in_doubt() -> None:
     """By a part of the step, beside it; elsewhere, and of a delay of whole readings, not at all."""
     recording = from_columns(recorded(0.0))
-    simulation, values = Brake(), {"share": 0.5}
-    load = complete_inputs(recording)["load_Nm"][:, 0]
-    assert doubts_by_moved(recording, simulation, values, {"load_Nm": 3.0}, {}) == []
-    (doubt,) = doubts_by_moved(recording, simulation, values, {"load_Nm": 2.5}, {})
+    simulation = Brake()
+    inputs = complete_inputs(recording)
+    load = inputs["load_Nm"][:, 0]
+
+    def predict(others: Mapping[str, np.ndarray]) -> np.ndarray:
+        return simulation.predict(dict(others), {"share": 0.5})
+
+    assert doubts_by_moved(recording, predict, predict(inputs), {"load_Nm": 3.0}, {}) == []
+    (doubt,) = doubts_by_moved(recording, predict, predict(inputs), {"load_Nm": 2.5}, {})
     steps = np.abs(np.append(np.diff(load), 0.0))
     np.testing.assert_allclose(
         np.sqrt(doubt.alone[2:-2, 0])[steps[2:-2] > 0], 0.5 * steps[2:-2][steps[2:-2] > 0] * 0.3536, rtol=1e-3
