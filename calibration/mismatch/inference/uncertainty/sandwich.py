@@ -221,11 +221,11 @@ def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation,
     information = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
     matrix = information + precision
     inverse = pseudo_inverse(matrix, SINGULAR)
-    scores = columns * (design.in_time(whitened_residual_of(equations, fit)) * weights)[None]
-    sums = block_sums(scores, blocks)
+    errors = moments_of_errors(design, weights, columns)
+    columns *= design.in_time(whitened_residual_of(equations, fit)) * weights  # in place: they may be 20 MB
+    sums = block_sums(columns, blocks)
     count = int(blocks.max()) + 1
     middle = sums.T @ sums * count / max(count - 1, 1) + precision
-    errors = moments_of_errors(design, weights, columns)
     middle += covariance_of_scores(errors)
     fitted = np.arange(len(information)) < len(fit.columns)
     pull = np.where(fitted, 0.0, sums.sum(axis=0)) + linearisation.pull

@@ -24,12 +24,16 @@ Index = NDArray[np.int64]
 
 MANY = 256
 """New columns from which on the products of all columns are summed at once (a choice: the grid, and no proposals)."""
+ROWS_AT_ONCE = 4
+"""Times as much of columns of which products are asked for as of others is in memory (a choice: the others are read
+anew for each part)."""
 LONGEST_PART = 8192
 """Instants of all columns that are in memory at once (a choice: about 25 MiB)."""
 LONGEST_PIECE = 512
 """Instants that are multiplied at once (a choice: of shorter pieces a product of matrices takes longer for each)."""
-ROOM = 192
-"""Later columns for which room is made at once (a choice: twice that costs more memory, half of it more time)."""
+ROOM, ROOM_FOR_ROWS = 192, 64
+"""Later columns for which room is made at once, and those of them of which products are asked for (a choice: twice
+that costs more memory, half of it more time)."""
 
 
 class Sums:
@@ -54,6 +58,9 @@ class Sums:
         self._energy: Single = np.zeros((*leading, 0), np.float32)
         self._later: Single = np.zeros((*leading, 0, 0), np.float32)
         self._known: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
+        self._row: Index = np.zeros(0, np.int64)
+        """Of each later column, its row in `_later` and `_known`; −1 where its products were never asked for."""
+        self._rows = 0
         self._own: dict[tuple[tuple[int, ...], tuple[int, ...]], Array] = {}
         self._precise: dict[tuple[int, ...], tuple[Array, Array]] = {}
         self._summed = 0
@@ -69,11 +76,11 @@ class Sums:
         self._sum_later(rows[later], columns)
         self._sum_later(columns[of_later], rows[early])
         found = np.empty((*self._square.shape[:2], len(rows), len(columns)), np.float32)
-        found[:, :, later] = self._later[:, :, (rows[later] - first)[:, None], columns]
+        found[:, :, later] = self._later[:, :, self._row[rows[later] - first][:, None], columns]
         found[:, :, early[:, None], of_early] = self._square[
             :, :, self._rank[rows[early]][:, None], self._rank[columns[of_early]]
         ]
-        mirrored = self._later[:, :, (columns[of_later] - first)[:, None], rows[early]]
+        mirrored = self._later[:, :, self._row[columns[of_later] - first][:, None], rows[early]]
         found[:, :, early[:, None], of_later] = np.swapaxes(mirrored, 2, 3)
         return found
 
@@ -179,10 +186,12 @@ class Sums:
         """Sum the products of later columns with others that are not known yet."""
         if not len(later) or not len(columns):
             return
-        unknown = ~self._known[(later - self._square.shape[-1])[:, None], columns]
+        self._make_room_for_rows(later)
+        unknown = ~self._known[self._row[later - self._square.shape[-1]][:, None], columns]
         rows, others = later[unknown.any(axis=1)], np.unique(columns[unknown.any(axis=0)])
-        if len(rows):
-            self._keep(rows, others, self._of(self._columns.read(rows), others))
+        for first in range(0, len(rows), self._columns.at_once * ROWS_AT_ONCE):
+            part = rows[first : first + self._columns.at_once * ROWS_AT_ONCE]
+            self._keep(part, others, self._of(self._columns.read(part), others))
 
     def _of(self, rows: Single, columns: Index) -> Single:
         """Return sums of products of rows (row, wheel, time) with columns of the file."""
@@ -197,26 +206,38 @@ class Sums:
         return found
 
     def _keep(self, rows: Index, columns: Index, values: Single) -> None:
-        """Keep products of later columns, in the rows of both where the others are later ones too."""
+        """Keep products of later columns, in the rows of both where the others have one too."""
         first = self._square.shape[-1]
-        at, later = rows - first, np.flatnonzero(columns >= first)
+        at, later = self._row[rows - first], np.flatnonzero(columns >= first)
         self._later[:, :, at[:, None], columns] = values
         self._known[at[:, None], columns] = True
-        if not self._searched:
-            return  # Rows that were never asked for would take memory.
-        mirrored = columns[later] - first
+        mirrored = self._row[columns[later] - first]
+        later, mirrored = later[mirrored >= 0], mirrored[mirrored >= 0]
         self._later[:, :, mirrored[:, None], rows] = np.swapaxes(values[:, :, :, later], 2, 3)
         self._known[mirrored[:, None], rows] = True
 
     def _make_room(self, count: int) -> None:
-        """Make room for the products of later columns, up to so many columns in all."""
+        """Make room for later columns, up to so many columns in all."""
         later = count - self._square.shape[-1]
-        if later <= len(self._known) and count <= self._known.shape[1]:
-            return
-        shape = later + ROOM, count + ROOM
+        if later > len(self._row):
+            self._row = np.concatenate((self._row, np.full(later + ROOM - len(self._row), -1)))
+        if count > self._known.shape[1]:
+            self._grow(len(self._known), count + ROOM)
+
+    def _make_room_for_rows(self, later: Index) -> None:
+        """Make room for the products of later columns that were not asked for before."""
+        places = later - self._square.shape[-1]
+        fresh = np.unique(places[self._row[places] < 0])
+        self._row[fresh] = self._rows + np.arange(len(fresh))
+        self._rows += len(fresh)
+        if self._rows > len(self._known):
+            self._grow(self._rows + ROOM_FOR_ROWS, self._known.shape[1])
+
+    def _grow(self, rows: int, columns: int) -> None:
+        """Give the products of later columns so many rows and columns."""
         kept = tuple(slice(0, size) for size in self._known.shape)
-        grown: Single = np.zeros((*self._square.shape[:2], *shape), np.float32)
+        grown: Single = np.zeros((*self._square.shape[:2], rows, columns), np.float32)
         grown[(slice(None), slice(None), *kept)] = self._later
-        known = np.zeros(shape, np.bool_)
+        known = np.zeros((rows, columns), np.bool_)
         known[kept] = self._known
         self._later, self._known = grown, known
