@@ -105,6 +105,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "Ranges",
         "RangeSums",
         "NoiseModel",
+        "LaggedSums",
         "NormalEquations",
         "Decision",
         "Inputs",

@@ -68,11 +68,12 @@ class ArmWithAngle(Arm):
 
 
 def columns(
-    seed: int, coulomb: Sequence[float] = (0.0, 0.0), viscous: float = 0.0, ripple: float = 0.0
+    seed: int, coulomb: Sequence[float] = (0.0, 0.0), viscous: float = 0.0, ripple: float = 0.0, hump: float = 0.0
 ) -> dict[str, NDArray[Any]]:
     """Return one recording: half a minute, with the Coulomb friction of each joint, and viscous friction of both.
 
-    The ripple has `RIPPLES` cycles a turn, at one phase in all recordings of a motor.
+    The ripple has `RIPPLES` cycles a turn, at one phase in all recordings of a motor. The hump is a drag at one speed
+    alone, of which the library has no law.
     """
     rng, time_s = np.random.default_rng(seed), 0.05 * np.arange(600)
     made: dict[str, list[NDArray[Any]]] = {}
@@ -82,6 +83,7 @@ def columns(
         angle = seed + GEAR * 0.05 * np.cumsum(speed)
         torque = 0.5 * acceleration + drag * np.sign(speed) + viscous * speed
         torque += ripple * np.cos(RIPPLES * angle + JOINTS.index(axis))
+        torque += hump * np.sign(speed) * np.exp(-(((np.abs(speed) - 0.8) / 0.2) ** 2))
         rows = {
             "t_s": time_s,
             "axis": np.full(len(time_s), axis),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
+from regolithd.calibration.mismatch.fleet.work.fleet_curve import FleetCurve
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
 
@@ -71,6 +72,9 @@ GROUPS = (
 DRAG, WEAR, WAVE = GROUPS
 COLUMNS = 5
 """The tangent of `gain`, and the candidates' columns."""
+KNOTS = len(FleetCurve.coefficients)
+CURVE = GridGroup(FleetCurve(), {"over": "load"}, tuple(range(COLUMNS, COLUMNS + KNOTS)), 1)
+"""A curve, whose columns come after those."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +84,11 @@ class Drive:
     columns: Array
     residual: Array
 
+    @property
+    def groups(self) -> tuple[GridGroup, ...]:
+        """The candidates, and the curve where it has its columns."""
+        return (*GROUPS, CURVE) if len(self.columns) > COLUMNS else GROUPS
+
     def sums(self, mean_size: float = 1.0, wheel_sets: tuple[tuple[int, ...], ...] = ()) -> Sums:
         """Return the sums of products that a comparison makes of it."""
         weights = 1 / DEVIATION**2
@@ -88,8 +97,8 @@ class Drive:
             wheels=WHEELS,
             tangents=("gain",),
             prior_stds=np.array([PRIOR_STD]),
-            places=tuple(group.columns for group in GROUPS),
-            penalties=np.zeros(len(GROUPS)),
+            places=tuple(group.columns for group in self.groups),
+            penalties=np.zeros(len(self.groups)),
             own=(),
             gram=np.einsum("ctw,dtw->wcd", self.columns, self.columns),
             moment=np.einsum("ctw,tw->wc", self.columns, self.residual),
@@ -97,17 +106,17 @@ class Drive:
             energy=np.sum(self.residual**2, axis=0),
             counts=np.full(len(WHEELS), float(INSTANTS)),
             weights=weights,
-            blocks=products.reshape(COLUMNS, BLOCKS, -1, len(WHEELS)).sum(axis=2).transpose(1, 2, 0),
+            blocks=products.reshape(len(self.columns), BLOCKS, -1, len(WHEELS)).sum(axis=2).transpose(1, 2, 0),
             mean_size=mean_size,
             wheel_sets=wheel_sets,
-            reductions=np.ones(len(GROUPS)),
+            reductions=np.ones(len(self.groups)),
         )
 
 
-def drive(seed: int, concealed: Mapping[tuple[int, int], float] | None = None) -> Drive:
-    """Return a recording with noise and concealed effects: sizes by (column, wheel)."""
+def drive(seed: int, concealed: Mapping[tuple[int, int], float] | None = None, count: int = COLUMNS) -> Drive:
+    """Return a recording of so many columns with noise and concealed effects: sizes by (column, wheel)."""
     rng = np.random.default_rng(seed)
-    columns = rng.normal(size=(COLUMNS, INSTANTS, len(WHEELS)))
+    columns = rng.normal(size=(count, INSTANTS, len(WHEELS)))
     residual = rng.normal(size=(INSTANTS, len(WHEELS))) * DEVIATION
     for (column, wheel), size in (concealed or {}).items():
         residual[:, wheel] += size * columns[column, :, wheel]
@@ -121,7 +130,7 @@ def on_both(column: int, size: float) -> dict[tuple[int, int], float]:
 
 def equations_of(drives: Sequence[Drive], rover: Sequence[int], level: Level = "rover") -> FleetEquations:
     """Return the equations of recordings, one a day, of these rovers."""
-    return fleet_equations([each.sums() for each in drives], rover, range(len(drives)), GROUPS, level)
+    return fleet_equations([each.sums() for each in drives], rover, range(len(drives)), drives[0].groups, level)
 
 
 def term(group: GridGroup, course: Course, rovers: Sequence[int] = (0,), wheels: Sequence[int] = ALL) -> FleetTerm:

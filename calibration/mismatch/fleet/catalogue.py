@@ -97,7 +97,7 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
 
     Beside what that recording shows itself, which may leave nothing to tell a size from.
     """
-    for index, term in enumerate(chosen.fit.terms):
+    for index, term in enumerate(chosen.fit.named):
         effect = answer.effects[index]
         coefficient = term.group.candidate.coefficients[0]
         beside = chosen.beside
@@ -129,15 +129,15 @@ def _within(estimate: Estimate | None) -> dict[str, float]:
 
 def _rows_of_recordings(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow]:
     """Yield what single recordings show beside the fleet's effects."""
-    for effect in answer.effects[len(chosen.fit.terms) :]:
+    for effect in answer.effects[len(chosen.fit.named) :]:
         recording = chosen.names.recordings.index(effect.recordings[0])
         for wheel in effect.wheels:
             yield _row(chosen, recording, wheel=str(wheel), found="recording", acts=True, **_first(effect))
     for rest in answer.unexplained:
-        recording = chosen.names.recordings.index(rest.recordings[0])
-        for wheel in rest.wheels:
-            told = {"covariate": rest.covariate, "channel": rest.channel}
-            yield _row(chosen, recording, wheel=str(wheel), found="unexplained", acts=True, **told)
+        told = {"covariate": rest.covariate, "channel": rest.channel}
+        for recording in map(chosen.names.recordings.index, rest.recordings):
+            for wheel in rest.wheels:
+                yield _row(chosen, recording, wheel=str(wheel), found="unexplained", acts=True, **told)
 
 
 def _rows_of_parameters(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow]:

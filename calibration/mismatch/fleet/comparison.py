@@ -14,6 +14,8 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows, write_catalogue
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
+from regolithd.calibration.mismatch.fleet.choice.common_noise import with_common_noise
+from regolithd.calibration.mismatch.fleet.choice.curves import with_curves
 from regolithd.calibration.mismatch.fleet.choice.earned import earned
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.released import with_released
@@ -24,6 +26,7 @@ from regolithd.calibration.mismatch.fleet.evidence import FleetEvidence
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.told.joint import joint_parameters
+from regolithd.calibration.mismatch.fleet.work.curves import with_curves_of
 from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, finer_grid, grid_of, placed
 from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
@@ -301,13 +304,14 @@ def _of_channel(
     kept = sorted(found)
     compared = _Compared([members[n] for n in kept], [found[n] for n in kept], columns)
     grid = grid_of(forms_of(simulation), compared.found, 0, [member.rover for member in compared.members])
+    grid = with_curves_of(grid, compared.found)
     searched = compared.searched(grid, load, channel, level, work)
     finer = finer_grid(grid, [term.group for term in searched.fit.terms], compared.found)
     if len(finer) > len(grid):
         del searched  # memory holds the sums of one search at a time
         searched = compared.searched(finer, load, channel, level, work)
     chooser, results = searched.chooser, searched.found
-    fit = earned(chooser, searched.fit, results)
+    fit = earned(chooser, with_curves(chooser, searched.fit), results)
     chooser = replace(chooser, equations=with_released(chooser.equations, fit, results, simulation.parameters))
     fit = earned(chooser, chooser.equations.fit(fit.terms), results)  # a released parameter may act as a name does
     return Chosen(chooser, fit, searched.names, results, simulation)
@@ -344,7 +348,8 @@ class _Compared:
         )
         kept = sorted(sums)
         names = _names([members[n] for n in kept])
-        equations = _equations([sums[n] for n in kept], names, [members[n] for n in kept], grid, level)
+        weighted = with_common_noise([sums[n] for n in kept], [found[n] for n in kept])
+        equations = _equations(weighted, names, [members[n] for n in kept], grid, level)
         work.progress("searching", len(kept), len(kept))
         places = places_of(equations)
         chooser = Chooser(equations, places, entry_threshold(equations, places))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from regolithd.calibration.mismatch.corrected import (
 from regolithd.calibration.mismatch.errors import MismatchError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
@@ -35,20 +36,31 @@ Told = tuple["Contribution", "FleetEffect"]
 def acting_last(chosen: Chosen, answer: FleetAnswer, channel: str = "") -> list[Told]:
     """Return the terms of the effects that act in the last recording of the only rover, as large as they are there.
 
-    Nothing of several rovers. `channel` is that of the terms; empty where the simulation predicts one alone.
+    Those of all recordings, and those that the last one shows by itself. Nothing of several rovers. `channel` is that
+    of the terms; empty where the simulation predicts one alone.
     """
     if len(answer.rovers) > 1:
         return []
     equations, fit = chosen.equations, chosen.beside.fit
     last, found = equations.recordings_of[0][-1], []
-    for term, span, effect in zip(fit.terms, fit.spans, answer.effects, strict=False):
+    for term, span, effect in zip(fit.named, fit.spans, answer.effects, strict=False):
         factors = fit.factors[span][:, last].max(axis=0)
         wheels = tuple(name for name, factor in zip(equations.wheels, factors, strict=True) if factor != 0)
         if wheels:
             sizes = _of_candidate(term, fit.coefficients[span], len(equations.wheels))
             coefficients = tuple((float(np.max(factors)) * sizes).tolist())
             found.append((Contribution(term.name, term.group.shape, coefficients, wheels, channel=channel), effect))
-    return found
+    return [*found, *_of_recording(chosen, answer, last, channel)]
+
+
+def _of_recording(chosen: Chosen, answer: FleetAnswer, recording: int, channel: str) -> Iterator[Told]:
+    """Yield the terms of the effects that a recording shows by itself."""
+    alone = answer.effects[len(chosen.fit.named) :]
+    told = {effect.name: effect for effect in alone if effect.recordings == (chosen.names.recordings[recording],)}
+    for i, place in chosen.shown.terms:
+        term = chosen.found[i].terms[place]
+        if i == recording and term.contribution is not None and term.name in told:
+            yield replace(term.contribution, channel=channel), told[term.name]
 
 
 def _of_candidate(term: FleetTerm, sizes: Array, wheels: int) -> Array:

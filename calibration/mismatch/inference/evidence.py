@@ -57,7 +57,7 @@ def evidence_of(decision: Decision) -> Evidence:
         map_after=_standardised_block_means(problem, noise, after, blocks),
         curves=_curves(decision, before, after),
         values=calibrated_values(equations, named),
-        contributions=_contributions(equations, named),
+        contributions=contributions_of(equations, named),
         problem=problem,
     )
 
@@ -72,7 +72,7 @@ def empirical_fits(decision: Decision, curves: Sequence[FoundCurve]) -> tuple[Em
                 channel, wheel_names(equations.problem, each.terms[0].wheels), each.terms[0].name, each.curve
             ),
             values=calibrated_values(equations, each.fit),
-            contributions=_contributions(equations, each.fit),
+            contributions=contributions_of(equations, each.fit),
             at=each.points.at,
             mean=each.points.mean,
             standard_error=each.points.standard_error,
@@ -96,20 +96,25 @@ def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     return {name: problem.values.get(name, 0.0) + known.get(name, 0.0) for name in {**problem.values, **known}}
 
 
-def _contributions(equations: NormalEquations, fit: Fit) -> tuple[Contribution, ...]:
+def contributions_of(equations: NormalEquations, fit: Fit) -> tuple[Contribution, ...]:
     """Return the named terms as a corrected simulation holds them, changes of what it has already last."""
-    scale = equations.design.scale
-    named, changed = [], []
-    for i, term in enumerate(fit.terms):
-        coefficients = (fit.coefficients[fit.of_term(i)] / scale[list(term.group.columns)]).tolist()
-        wheels = wheel_names(equations.problem, term.wheels)
-        if isinstance(term.group.candidate, ChangedSize):
-            changed.append(contribution_of_change(term.group.candidate, coefficients[0], wheels))
-        else:
-            contribution = Contribution(term.name, term.group.shape, tuple(coefficients), wheels)
-            begins = Candidate.change_point in term.group.shape
-            named.append(replace(contribution, found_in=found_here(equations.problem)) if begins else contribution)
-    return (*named, *changed)
+    of_terms = [contribution_of(equations, fit, index) for index in range(len(fit.terms))]
+    changed = [isinstance(term.group.candidate, ChangedSize) for term in fit.terms]
+    named = [each for each, is_change in zip(of_terms, changed, strict=True) if not is_change]
+    return (*named, *(each for each, is_change in zip(of_terms, changed, strict=True) if is_change))
+
+
+def contribution_of(equations: NormalEquations, fit: Fit, index: int) -> Contribution:
+    """Return a named term as a corrected simulation holds it."""
+    term, problem = fit.terms[index], equations.problem
+    scale = equations.design.scale[list(term.group.columns)]
+    coefficients = (fit.coefficients[fit.of_term(index)] / scale).tolist()
+    wheels = wheel_names(problem, term.wheels)
+    if isinstance(term.group.candidate, ChangedSize):
+        return contribution_of_change(term.group.candidate, coefficients[0], wheels)
+    contribution = Contribution(term.name, term.group.shape, tuple(coefficients), wheels)
+    begins = Candidate.change_point in term.group.shape
+    return replace(contribution, found_in=found_here(problem)) if begins else contribution
 
 
 def _block_centres(problem: Problem, blocks: Index) -> Array:

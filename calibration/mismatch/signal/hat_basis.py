@@ -38,8 +38,11 @@ class KnotPlaces:
         if not known.any():
             return None
         at = _knots(values[known], knots)
-        if len(at) < FEWEST_KNOTS or at[-1] - at[0] <= 0:
-            return None
+        return cls.between(values, known, at) if len(at) >= FEWEST_KNOTS and at[-1] > at[0] else None
+
+    @classmethod
+    def between(cls, values: Array, known: NDArray[np.bool_], at: Array) -> KnotPlaces:
+        """Return it for knots at these places, ascending; values beyond them count as those at the outermost ones."""
         clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])
         left = np.clip(np.searchsorted(at, clipped, side="right") - 1, 0, len(at) - 2)
         right_share = np.where(clipped < at[-1], (1 / np.diff(at))[left] * (clipped - at[left]), 1.0)
@@ -53,15 +56,29 @@ def hat_functions(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Ar
     """
     known = mask & np.isfinite(values)
     between = KnotPlaces.of(values, known, knots)
-    if between is None:
-        return []
-    hats = np.zeros((between.knots, *values.shape))
+    return [] if between is None else _hats(between, known)
+
+
+def hat_functions_at(values: Array, mask: NDArray[np.bool_], at: Array) -> list[Array]:
+    """Return hat functions of a covariate with knots at these places, ascending."""
+    known = mask & np.isfinite(values)
+    return _hats(KnotPlaces.between(values, known, at), known)
+
+
+def _hats(between: KnotPlaces, known: NDArray[np.bool_]) -> list[Array]:
+    hats = np.zeros((between.knots, *known.shape))
     np.put_along_axis(hats, between.left[None], np.where(known, 1 - between.right_share, 0.0)[None], axis=0)
     np.put_along_axis(hats, between.left[None] + 1, np.where(known, between.right_share, 0.0)[None], axis=0)
     return list(hats)
 
 
+def range_of(values: Array) -> tuple[float, float]:
+    """Return where the outermost knots of known values are."""
+    low, high = np.quantile(values, OUTER_QUANTILES)
+    return float(low), float(high)
+
+
 def _knots(inside: Array, count: int) -> Array:
-    low, high = (float(q) for q in np.quantile(inside, OUTER_QUANTILES))
+    low, high = range_of(inside)
     quantiles = np.quantile(inside, np.linspace(*OUTER_QUANTILES, count))
     return np.unique(0.5 * (quantiles + np.linspace(low, high, count)))

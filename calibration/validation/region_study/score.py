@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch import compare
+from regolithd.calibration.mismatch.problem.covariates import names_of_prediction
 from regolithd.calibration.validation.lisdd import lisdd
 from regolithd.calibration.validation.region_study.machines import Array, Case, Mask, Stated
 
@@ -89,7 +90,12 @@ def held_of(answer: Answer, case: Case) -> tuple[int, int]:
 
 
 def _values(case: Case, covariate: str) -> Array:
-    values = case.recorded[case.machine.covariates[covariate]] if covariate != "time" else case.recorded["t_s"]
+    """Return a covariate of each row: a recorded one, the time, or the size of what the machine's law predicts."""
+    if covariate == "time":
+        return case.recorded["t_s"]
+    if covariate in names_of_prediction(case.machine.channel):
+        return np.abs(Stated(case.machine).predict(case.recorded, case.true))
+    values = case.recorded[case.machine.covariates[covariate]]
     return np.abs(values) if covariate == "wheel_speed" else values
 
 

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.fleet.choice.search import further
 from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.inference.other_answers.alternatives import LARGEST_MARGIN, Alternative
+from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
-    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
 
 
 def other_choices(chooser: Chooser, fit: FleetFit) -> tuple[Alternative, ...]:
@@ -40,13 +41,21 @@ def _neighbours(chooser: Chooser, fit: FleetFit) -> Iterator[FleetFit]:
     for index in range(len(fit.terms)):
         rest = equations.fit(without(fit, index))
         yield rest
-        for _, other in further(equations, rest, chooser.places)[:tried]:
+        for other in _further(chooser, rest, tried):
             yield equations.fit((*rest.terms, other))
-    for _, more in further(equations, fit, chooser.places)[:tried]:
+    for more in _further(chooser, fit, tried):
         trial = equations.fit((*fit.terms, more))
         if chooser.worthwhile(fit, trial):
             yield trial
 
 
+def _further(chooser: Chooser, fit: FleetFit, tried: int) -> Iterator[FleetTerm]:
+    """Yield the best further names, and the best further curve."""
+    equations = chooser.equations
+    for groups, most in ((equations.named_groups, tried), (equations.curve_groups, 1)):
+        for _, term in further(equations, fit, chooser.places, groups)[:most]:
+            yield term
+
+
 def _names(fit: FleetFit) -> tuple[str, ...]:
-    return tuple(sorted({term.name for term in fit.terms}))
+    return tuple(sorted({term.name if term.group.named else UNEXPLAINED for term in fit.terms}))

@@ -69,6 +69,16 @@ class FleetEquations:
     reductions: Array = field(repr=False)
     released: frozenset[int] = frozenset()
 
+    @cached_property
+    def named_groups(self) -> tuple[GridGroup, ...]:
+        """The candidates of the grid that have a name."""
+        return tuple(group for group in self.groups if group.named)
+
+    @cached_property
+    def curve_groups(self) -> tuple[GridGroup, ...]:
+        """The curves, which have none."""
+        return tuple(group for group in self.groups if not group.named)
+
     @property
     def count(self) -> int:
         """Number of recordings."""

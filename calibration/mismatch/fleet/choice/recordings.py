@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Effect, Unexplained
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
-    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 
 Array = NDArray[np.float64]
@@ -86,10 +86,20 @@ def _curve_of(equations: FleetEquations, recording: int, term: FoundTerm) -> tup
 
 
 def _is_of_the_fleet(equations: FleetEquations, fit: FleetFit, recording: int, term: FoundTerm) -> bool:
-    """Return whether an effect of the fleet acts in a recording by the same law: its size there is in the catalogue."""
-    same = [index for index, of_fleet in enumerate(fit.terms) if term.named and of_fleet.name == term.name]
+    """Return whether an effect of the fleet acts in a recording by the same law: its size there is in the catalogue.
+
+    Of a curve that is one over the same covariate.
+    """
+    same = [index for index, of_fleet in enumerate(fit.terms) if _is_same(of_fleet, term)]
     wheels = [equations.wheels.index(equations.sums[recording].wheels[wheel]) for wheel in term.wheels]
     return any(fit.factors[fit.spans[index], recording][:, wheels].any() for index in same)
+
+
+def _is_same(of_fleet: FleetTerm, term: FoundTerm) -> bool:
+    """Return whether a term of the fleet and one of a recording are the same law, or curves over one covariate."""
+    if of_fleet.group.named != term.named:
+        return False
+    return term.name == (of_fleet.name if term.named else of_fleet.group.shape["over"])
 
 
 def gain_beside(equations: FleetEquations, fit: FleetFit, recording: int, index: int) -> float:

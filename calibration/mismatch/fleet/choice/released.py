@@ -32,6 +32,8 @@ def with_released(
     """
     shown = shown_beside(equations, fit, found)
     unexplained = {recording for recording, _ in shown.curves}
+    for curve in fit.curves:
+        unexplained |= set(np.flatnonzero(equations.factors(curve).any(axis=(0, 2))).tolist())
     beside = equations.beside(shown.terms)
     again, count, out = beside.fit(fit.terms), len(equations.tangents), set[int]()
     factors = equations.parameter_factors[1]

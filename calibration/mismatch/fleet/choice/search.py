@@ -141,13 +141,16 @@ def may_share(group: GridGroup, units: Units, wheel_count: int) -> bool:
 def further(
     equations: FleetEquations, fit: FleetFit, places: Sequence[Place], groups: Sequence[GridGroup] | None = None
 ) -> list[tuple[float, FleetTerm]]:
-    """Return the best further term of each candidate on each set of units, with Δχ² less penalty, best first."""
+    """Return the best further term of each name on each set of units, with Δχ² less penalty, best first.
+
+    `groups` are those that are searched; None: those that have a name.
+    """
     left = equations.left_moment(fit)
     best: list[tuple[float, FleetTerm]] = []
     for place in places:
         allowed = [
             group
-            for group in (equations.groups if groups is None else groups)
+            for group in (equations.named_groups if groups is None else groups)
             if may_share(group, place.units, len(equations.wheels)) and place.courses(group)
         ]
         of_name: dict[str, tuple[float, FleetTerm]] = {}

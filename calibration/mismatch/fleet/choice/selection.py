@@ -48,12 +48,13 @@ class Chooser:
         """
         alone = [place for place in self.places if len(place.units.rovers) == 1]
         searches = [self.places, alone] if 0 < len(alone) < len(self.places) else [self.places]
-        found = [self._grown(start, places) for places in searches for start in self._starts(places)]
-        return self._confirmed(max(found, key=self.evidence))
+        found = [self.grown(start, places) for places in searches for start in self._starts(places)]
+        return self.confirmed(max(found, key=self.evidence))
 
     def evidence(self, fit: FleetFit) -> float:
-        """Return the score of a fit less what its effects had to gain to enter."""
-        return score(self.equations, fit) - self.entry_threshold * len(fit.terms)
+        """Return the score of a fit less what its effects and curves had to gain to enter."""
+        entries = self.entry_threshold * len(fit.named) + THRESHOLDS.smooth_term_entry * len(fit.curves)
+        return score(self.equations, fit) - entries
 
     def _starts(self, places: Sequence[Place]) -> list[FleetFit]:
         """Return the fits of one law each that may be named, in its best place, the best first; or that of none."""
@@ -66,16 +67,16 @@ class Chooser:
                 starts[term.name] = fit
         return list(starts.values()) or [nothing]
 
-    def _grown(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit:
+    def grown(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit:
         """Return the fit with further effects, chosen one after the other, each searched anew beside the others."""
         start = fit
         while len(fit.terms) < MOST_TERMS:
             best = self._best_further(fit, places)
             if best is None:
                 break
-            fit = self._searched_anew(best, places)
+            fit = self.searched_anew(best, places)
         # A law by itself would be exchanged for the best one, with which another search begins.
-        return self._that_gain_enough(self._searched_anew(fit, places) if fit is start else fit)
+        return self._that_gain_enough(self.searched_anew(fit, places) if fit is start else fit)
 
     def _that_gain_enough(self, fit: FleetFit) -> FleetFit:
         """Return the fit without effects that gain too little beside those that were chosen after them."""
@@ -117,12 +118,13 @@ class Chooser:
                 beside += explained
         return with_it.delta_chi2 - told.delta_chi2 > FURTHER_SHARE * beside
 
-    def _searched_anew(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit:
+    def searched_anew(self, fit: FleetFit, places: Sequence[Place]) -> FleetFit:
         """Return the fit with each term replaced by the best one on overlapping units beside the others."""
         for index in range(len(fit.terms)):
             rest, old = self.equations.fit(without(fit, index)), fit.terms[index]
             near = [place for place in places if set(place.units.rovers) & set(old.units.rovers)]
-            trials = [term for _, term in further(self.equations, rest, near)[:2]]
+            alike = self.equations.named_groups if old.group.named else self.equations.curve_groups
+            trials = [term for _, term in further(self.equations, rest, near, alike)[:2]]
             trials += self._on_fewer_rovers(fit, index)
             for term in trials:
                 trial = self.equations.fit((*rest.terms[:index], term, *rest.terms[index:]))
@@ -155,14 +157,30 @@ class Chooser:
     def _certain(self, fit: FleetFit, index: int) -> NDArray[np.bool_]:
         """Return which sizes of a term have their signs, and are further from 0 than the entry asks for.
 
-        Of a size that is a rover's own that is asked for each of the rovers, as for having been chosen among them.
+        Of a size that is a rover's own that is asked for each of the rovers, as for having been chosen among them. Of a
+        curve all of its knots have to be, together.
         """
         term, span = fit.terms[index], fit.spans[index]
+        if not term.group.named:
+            return self._certain_curves(fit, index)
         sizes = fit.coefficients[span].reshape(-1, len(term.group.columns))
         variances = np.diag(fit.covariance)[span].reshape(sizes.shape)
         signed = np.all(np.array(term.group.signs) * sizes >= 0, axis=1)
         needed = self.entry_threshold + 2 * np.log(len(self.equations.recordings_of))
-        return np.asarray(signed & (np.max(sizes**2 / variances, axis=1) >= needed))
+        certain = np.divide(sizes**2, variances, out=np.zeros(sizes.shape), where=variances > 0)
+        return np.asarray(signed & (np.max(certain, axis=1) >= needed))
+
+    def _certain_curves(self, fit: FleetFit, index: int) -> NDArray[np.bool_]:
+        """Return which of a curve's parts explain more than chance beside all else."""
+        equations, term, rest = self.equations, fit.terms[index], without(fit, index)
+        needed = THRESHOLDS.smooth_term_entry + THRESHOLDS.coefficient_penalty * len(term.group.columns)
+        needed += 2 * np.log(len(equations.recordings_of))
+        gains = []
+        for rovers, _ in term.parts:
+            others = tuple(rover for rover in term.units.rovers if rover not in rovers)
+            less = equations.fit((*rest, equations.on_rovers(term, others)) if others else rest)
+            gains.append(fit.delta_chi2 - less.delta_chi2)
+        return np.array(gains) >= needed
 
     def acceptable(self, fit: FleetFit) -> bool:
         """Return whether every coefficient has its sign, every effect is large enough, and each law has one shape."""
@@ -171,7 +189,7 @@ class Chooser:
 
     def stands(self, fit: FleetFit) -> bool:
         """Return whether every effect may be named, and recordings that did not fit it confirm it."""
-        return self.acceptable(fit) and len(self._confirmed(fit).terms) == len(fit.terms)
+        return self.acceptable(fit) and len(self.confirmed(fit).terms) == len(fit.terms)
 
     def acceptable_term(self, fit: FleetFit, index: int) -> bool:
         """Return whether an effect has its signs, is large enough, and on each rover whose size is its own certain."""
@@ -183,7 +201,7 @@ class Chooser:
             return False
         return relative_size(self.equations, fit, index) >= THRESHOLDS.smallest_effect
 
-    def _confirmed(self, fit: FleetFit) -> FleetFit:
+    def confirmed(self, fit: FleetFit) -> FleetFit:
         """Return the fit without effects that recordings which did not fit them do not confirm, the worst first."""
         while fit.terms:
             margins = [self._transfer_margin(fit, index) for index in range(len(fit.terms))]

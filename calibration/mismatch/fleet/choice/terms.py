@@ -60,7 +60,7 @@ class FleetFit:
 
     Attributes
     ----------
-    terms: what was fitted
+    terms: what was fitted, those that have a name first
     columns: of every coefficient, the free parameters' first, shape (coefficient,)
     factors: of every coefficient, shape (coefficient, recording, wheel)
     coefficients, covariance: in physical units
@@ -75,3 +75,13 @@ class FleetFit:
     covariance: Array
     delta_chi2: float
     spans: tuple[slice, ...]
+
+    @property
+    def named(self) -> tuple[FleetTerm, ...]:
+        """The terms that have a name."""
+        return tuple(term for term in self.terms if term.group.named)
+
+    @property
+    def curves(self) -> tuple[FleetTerm, ...]:
+        """The terms that have none."""
+        return tuple(term for term in self.terms if not term.group.named)

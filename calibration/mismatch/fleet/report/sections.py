@@ -152,7 +152,7 @@ def unexplained(answer: FleetAnswer, labels: Labels, wheels: Sequence[int | str]
     return tuple(
         UnexplainedRow(
             rover=", ".join(place.rovers),
-            recording=", ".join(place.recordings),
+            recording=place.recordings[0] if len(place.recordings) == 1 else f"{len(place.recordings)} recordings",
             covariate=labels.covariate(place.covariate) + (f", only {place.range.statement}" if place.range else ""),
             where=labels.wheels(place.wheels, wheels),
             when=f"{number(place.from_s)} to {number(place.to_s)} s",

@@ -39,15 +39,28 @@ class FleetEffect(Effect):
 
 @dataclass(frozen=True)
 class FleetUnexplained(Unexplained):
-    """A structure that one recording shows."""
+    """A structure that one recording shows, or that several have in common.
+
+    Attributes
+    ----------
+    rovers, recordings, since, until: as of an effect
+    """
 
     rovers: tuple[str, ...] = ()
     recordings: tuple[str, ...] = ()
+    since: str | None = None
+    until: str | None = None
 
     @property
     def told_where(self) -> str:
-        """The recording, and the rover where that has a name."""
-        return listed(self.recordings) + (f" of {self.rovers[0]}" if self.rovers[0] != ONLY_ROVER else "")
+        """The recording, or how many there are since when; and the rovers where these have names."""
+        of = f" of {listed(self.rovers)}" if self.rovers != (ONLY_ROVER,) else ""
+        if len(self.recordings) == 1:
+            return f"{self.recordings[0]}{of}"
+        when = "".join(
+            f" {word} {to_the_minute(date)}" for word, date in (("since", self.since), ("until", self.until)) if date
+        )
+        return f"{len(self.recordings)} recordings{of}{when}"
 
 
 @dataclass(frozen=True)
@@ -106,8 +119,10 @@ _ADDED: dict[str, dict[str, dict[str, Any]]] = {
         "until": _DATE | {"description": "When the first recording without it began; null: it stays."},
     },
     "unexplained": {
-        "rovers": _NAMES | {"description": "The rover that shows it."},
-        "recordings": _NAMES | {"description": "The recording that shows it."},
+        "rovers": _NAMES | {"description": "The rovers that show it."},
+        "recordings": _NAMES | {"description": "The recording that shows it, or those that have it in common."},
+        "since": _DATE | {"description": "As of an effect."},
+        "until": _DATE | {"description": "As of an effect."},
     },
     "calibrated_parameter": {"rovers": _NAMES | {"description": "The rovers that share it."}},
 }

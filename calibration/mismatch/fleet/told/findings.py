@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.fleet.choice.alternatives import other_choic
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
+from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
     FleetEffect,
@@ -122,9 +123,11 @@ def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
     held_out = held_out_squares(equations, fit)
     shown, beside = chosen.shown, chosen.beside
-    effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.terms)))
+    effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.named)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
-    rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
+    curves = tuple(_curve(chosen, len(fit.named) + place) for place in range(len(fit.curves)))
+    alone = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
+    rest = (*curves, *alone)
     parameters = _parameters(chosen, beside)
     named = effects or single or any(each.beyond_prior() for each in parameters)
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
@@ -132,7 +135,7 @@ def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
     counts = equations.counts
     before, after = (_rms(squares, counts) for squares in (held_out.before, held_out.after))
     # What single recordings show was decided by each alone, and is no choice among the names of all.
-    others = None if single or rest else other_choices(chosen.chooser, fit)
+    others = None if single or alone else other_choices(chosen.chooser, fit)
     limits = replace(THRESHOLDS, highest_probability=THRESHOLDS.highest_season_probability ** (1 / channels))
     return FleetAnswer(
         verdict=verdict,
@@ -145,7 +148,7 @@ def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
         left_out=_left_out(chosen),
         probability=None if others is None else probability(others, limits),
         alternatives=other_answers(others or (), limits),
-        notes=_notes(chosen),
+        notes=(*_notes(chosen), *((NOT_CONFIRMED,) if fit.terms and after > (1 - LEAST_FALL) * before else ())),
         rovers=tuple(_rover(chosen, rover) for rover in range(len(chosen.names.rovers))),
     )
 
@@ -247,9 +250,7 @@ def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect
     plain = {each.name: getattr(effect, each.name) for each in fields(effect)}
     rover = names.rovers[int(chosen.equations.rover[recording])]
     told = f"{names.recordings[recording]} of {rover}: {effect.statement}"
-    of_rover = chosen.equations.recordings_of[int(chosen.equations.rover[recording])]
-    place = of_rover.index(recording)
-    since = names.date(recording) if place else None
+    since, until = _dates_of_recording(chosen, recording)
     return FleetEffect(
         **{**plain, "statement": told},
         rovers=(rover,),
@@ -257,14 +258,44 @@ def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect
         since=since,
         since_low=since,
         since_high=since,
-        until=names.date(of_rover[place + 1]) if recording != of_rover[-1] else None,
+        until=until,
     )
 
 
 def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplained:
     names = chosen.names
-    rover = names.rovers[int(chosen.equations.rover[recording])]
-    return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
+    since, until = _dates_of_recording(chosen, recording)
+    rover, name = names.rovers[int(chosen.equations.rover[recording])], names.recordings[recording]
+    return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(name,), since=since, until=until)
+
+
+def _dates_of_recording(chosen: Chosen, recording: int) -> tuple[str | None, str | None]:
+    """Return since and until when something is there that one recording shows: its rover's others are without it."""
+    of_rover = chosen.equations.recordings_of[int(chosen.equations.rover[recording])]
+    place, date = of_rover.index(recording), chosen.names.date
+    return date(recording) if place else None, date(of_rover[place + 1]) if recording != of_rover[-1] else None
+
+
+def _curve(chosen: Chosen, index: int) -> FleetUnexplained:
+    """Return a curve that recordings have in common, and how much of what they leave it is, beyond chance."""
+    equations, fit, names = chosen.equations, chosen.fit, chosen.names
+    term = fit.terms[index]
+    acting = equations.factors(term).any(axis=0) & (equations.counts > 0)
+    date = names.date(term.course.first)
+    left, less = (equations.squares(each)[acting].sum() for each in (fit, equations.fit(without(fit, index))))
+    at = np.flatnonzero(acting.any(axis=1)).tolist()
+    return FleetUnexplained(
+        channel=chosen.simulation.channel,
+        wheels=tuple(equations.wheels[w] for w in term.units.wheels if acting[:, w].any()),
+        covariate=str(term.group.shape["over"]),
+        from_s=min(chosen.found[i].first_s for i in at),
+        to_s=max(chosen.found[i].last_s for i in at),
+        share_of_residual=float(np.clip((less - left) / max(less, 1e-300), 0.0, 1.0)),
+        rovers=tuple(names.rovers[rover] for rover in term.units.rovers),
+        recordings=tuple(names.recordings[i] for i in at),
+        since=date if term.course.kind == "since" else None,
+        until=date if term.course.kind == "until" else None,
+    )
 
 
 def owners_of(chosen: Chosen) -> list[tuple[str, ...]]:
@@ -347,6 +378,13 @@ def _notes(chosen: Chosen) -> tuple[str, ...]:
     return (*told, f"{IN_EACH_ALONE}: {', '.join(alone)}.") if (alone := in_each_alone(chosen)) else told
 
 
+NOT_CONFIRMED = (
+    "Beside what was found, the error on recordings that did not fit it is no smaller: what acts in one recording of a "
+    "rover, or in two, no other can confirm."
+)
+"""The note where the answer's own held-out error does not fall."""
+LEAST_FALL = 1e-3
+"""Share by which it falls, at least (a choice: what is told to a tenth of a percent)."""
 IN_EACH_ALONE = "Looked for in each recording by itself, not in all together"
 """How the note begins of what a weak effect of is not found: what acts on another channel, or repeats in none."""
 

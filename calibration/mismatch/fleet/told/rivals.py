@@ -33,7 +33,7 @@ def rivals(
     `labels` are what the machine calls its covariates.
     """
     found = []
-    for index, term in enumerate(fit.terms):
+    for index, term in enumerate(fit.named):
         members = [term, *_in_its_place(chooser, fit, index)]
         names = tuple(dict.fromkeys(member.name for member in members))
         if len(names) > 1:

@@ -33,7 +33,7 @@ def sensitivities(
     Of those that are `not_together` looked for it is infinite.
     """
     found = dict.fromkeys(not_together, float("inf"))
-    for group in chooser.equations.groups:
+    for group in chooser.equations.named_groups:
         place = _first_place(chooser, group)
         if place is None:
             found.setdefault(group.candidate.name, float("inf"))

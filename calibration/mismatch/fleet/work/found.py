@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.comparison import decided
-from regolithd.calibration.mismatch.inference.evidence import calibrated_values
+from regolithd.calibration.mismatch.inference.evidence import calibrated_values, contribution_of
 from regolithd.calibration.mismatch.inference.findings import noise_floor
 from regolithd.calibration.mismatch.inference.other_answers.probability import leads_of
+from regolithd.calibration.mismatch.regression.groups.state_groups import ON_STATE
 from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.signal.hat_basis import range_of
+from regolithd.calibration.mismatch.signal.noise_models.noise import LaggedSums, lagged_sums
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -23,15 +26,18 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.candidates.responses import Responses
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.inference.findings import Findings
     from regolithd.calibration.mismatch.problem.problem import Problem
-    from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
+
+NO_READINGS = LaggedSums(*np.zeros((3, 1)))
+"""Sums of a recording in which nothing is compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,7 @@ class FoundTerm:
     columns: shape (column, time, wheel), 0 on other wheels and where nothing is compared
     coupling: of a smooth term, how it acts
     lead: of the recording's own answer over the same without it, by the evidence, in Δχ²; infinite where that is none
+    contribution: of a candidate, as a corrected simulation holds it
     """
 
     name: str
@@ -58,6 +65,7 @@ class FoundTerm:
     columns: Single
     coupling: str = ""
     lead: float = inf
+    contribution: Contribution | None = None
 
 
 @dataclass(frozen=True)
@@ -88,6 +96,10 @@ class Found:
     reversal: how friction reverses, empty: at once; None: it has to be computed
     smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where they have to be computed
     unknown: initial states of runs, by their names, that are far off
+    ranges: of each covariate that a curve may be over, where its outermost knots are
+    usual_coupling: how such a curve acts, where nothing is known of it
+    first_s, last_s, step_s: of the recording's instants
+    lagged: sums over pairs of readings of what all that was found leaves
     """
 
     findings: Findings
@@ -107,6 +119,12 @@ class Found:
     reversal: Shape | None = None
     smoothed: dict[str, Single] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    usual_coupling: str = ""
+    first_s: float = 0.0
+    last_s: float = 0.0
+    step_s: float = 0.0
+    lagged: LaggedSums = NO_READINGS
 
 
 def one_channel(simulation: Simulation, channel: str) -> Simulation:
@@ -137,9 +155,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         autocorrelation_times=decision.noise.autocorrelation_times,
         noise_floor=noise_floor(decision),
         entry_threshold=decision.entry_threshold,
-        terms=tuple(
-            _found_term(decision, term, lead) for term, lead in zip(whole.terms, leads_of(decision), strict=True)
-        ),
+        terms=tuple(_found_term(decision, index, lead) for index, lead in enumerate(leads_of(decision))),
         shapes=shapes_in(problem, of_recording.candidates),
         labels=dict(problem.labels),
         late_inputs=dict(problem.on_time),
@@ -150,7 +166,30 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         reversal=dict(reversal_of(problem)),
         smoothed={name: values.astype(np.float32) for name, values in problem.smoothed.items()},
         unknown=tuple(sorted(problem.unknown)),
+        ranges=_ranges(decision),
+        usual_coupling=_usual_coupling(decision),
+        first_s=float(problem.time_s[0, 0]),
+        last_s=float(problem.time_s[-1, 0]),
+        step_s=problem.recording.step_s,
+        lagged=lagged_sums(residual_of(decision.equations, whole), problem.mask, decision.noise, thresholds),
     )
+
+
+def _ranges(decision: Decision) -> dict[str, tuple[float, float]]:
+    """Return where the outermost knots are of each covariate that has a smooth term."""
+    problem, found = decision.equations.problem, {}
+    for name in dict.fromkeys(group.name for group in decision.equations.design.groups if not group.named):
+        if name in problem.covariates:
+            values = problem.covariates[name]
+            known = values[problem.mask & np.isfinite(values)]
+            found[name] = range_of(np.abs(known) if name == "wheel_speed" else known)
+    return found
+
+
+def _usual_coupling(decision: Decision) -> str:
+    """Return how a smooth term acts: on a state, where the simulation has one that remembers; else along the motion."""
+    couplings = {group.coupling for group in decision.equations.design.groups if not group.named}
+    return next((each for each in (ON_STATE, "drag") if each in couplings), "offset")
 
 
 def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str, Responses]:
@@ -167,9 +206,9 @@ def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str,
     return found
 
 
-def _found_term(decision: Decision, term: Term, lead: float) -> FoundTerm:
-    equations = decision.equations
-    design = equations.design
+def _found_term(decision: Decision, index: int, lead: float) -> FoundTerm:
+    equations, whole = decision.equations, decision.whole
+    design, term = equations.design, whole.terms[index]
     columns = design.in_time(design.columns_as_read(term.group.columns)).astype(np.float32)
     columns[:, :, [wheel for wheel in equations.all_wheels if wheel not in term.wheels]] = 0.0
     return FoundTerm(
@@ -181,6 +220,7 @@ def _found_term(decision: Decision, term: Term, lead: float) -> FoundTerm:
         columns=columns,
         coupling=term.group.coupling,
         lead=lead,
+        contribution=contribution_of(equations, whole, index) if term.group.named else None,
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.responses import strongest
+from regolithd.calibration.mismatch.fleet.work.fleet_curve import FleetCurve
 from regolithd.calibration.mismatch.regression.groups.candidate_groups import coefficient_signs
 
 if TYPE_CHECKING:
@@ -46,6 +47,11 @@ class GridGroup:
     columns: tuple[int, ...]
     tried: int
     begins: bool = field(default=False)
+
+    @property
+    def named(self) -> bool:
+        """Whether it is an effect that has a name; else a curve."""
+        return not isinstance(self.candidate, FleetCurve)
 
     @property
     def signs(self) -> tuple[int, ...]:

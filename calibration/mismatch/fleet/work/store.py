@@ -17,11 +17,14 @@ import numpy as np
 
 from regolithd.calibration.mismatch import answer as answers
 from regolithd.calibration.mismatch.candidates.responses import Responses
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
 from regolithd.calibration.mismatch.inference.findings import Findings
+from regolithd.calibration.mismatch.problem.corrections.onset_clock import FoundIn
 from regolithd.calibration.mismatch.problem.corrections.size_posterior import SizePosterior
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.signal.noise_models.noise import LaggedSums
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -35,6 +38,9 @@ KINDS: Mapping[str, type] = {
         Shapes,
         Responses,
         Sums,
+        LaggedSums,
+        Contribution,
+        FoundIn,
         LeftOut,
         Findings,
         answers.Parameter,

@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.candidates.late_columns import as_shown, col
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.reversal import keep_reversal
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
+from regolithd.calibration.mismatch.fleet.work.fleet_curve import FleetCurve
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
@@ -107,7 +108,7 @@ def sums_of(
 ) -> Sums:
     """Return the sums of one recording, with the candidates of the fleet's grid in their shapes."""
     of_channel = one_channel(simulation, channel)
-    candidates = {each.name: each for each in forms_of(of_channel)}
+    candidates = {each.name: each for each in (*forms_of(of_channel), FleetCurve())}
     problem = _posed(recording, simulation, of_channel, found, thresholds)
     shaped = [(candidates[name], shape) for name, shape in laws]
     columns = _columns(problem, shaped, found.terms)

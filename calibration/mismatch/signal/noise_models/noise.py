@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,71 +61,118 @@ def estimate_noise(
         enough = (mask & moving).sum(axis=0) > LEAST_MOVING * mask.sum(axis=0)
         in_motion = _deviation(np.where(moving, clean, 0.0), mask & moving)
         deviation = np.where(enough, np.maximum(deviation, in_motion), deviation)
-    return NoiseModel(deviation, _autocorrelation_times(clean / deviation, mask, thresholds))
+    return NoiseModel(
+        deviation, autocorrelation_times(_sums_of_wheels(clean / deviation, mask, thresholds), thresholds)
+    )
 
 
-def _autocorrelation_times(scaled: Array, mask: Mask, thresholds: Thresholds) -> Array:
-    """Return each wheel's autocorrelation time, shape (wheel,).
+@dataclass(frozen=True, eq=False)
+class LaggedSums:
+    """Sums over pairs of readings that are so many instants apart, of a residual over its standard deviation.
 
-    The times of the wheels differ from the one that is pooled over them by as much as they scatter beyond chance (James
-    and Stein, 1961), and upwards alone: no wheel is believed more than all of them are. The relative variance of a sum
-    over M lags is 2 (2 M + 1) / n (Madras and Sokal, 1988).
+    Attributes
+    ----------
+    products: of such readings, shape (lag,)
+    pairs: how many there are, shape (lag,)
+    allowed: how many there would be if the readings that there are were evenly spread, shape (lag,)
     """
-    lags = int(thresholds.longest_lag_share * len(scaled))
-    squares, pairs = _sums_over_lags(scaled, lags), _pairs(mask, lags)
-    together = _significant(squares.sum(axis=1), pairs.sum(axis=1), len(scaled), thresholds)
+
+    products: Array
+    pairs: Array
+    allowed: Array
+
+    @classmethod
+    def of(cls, products: Array, pairs: Array, instants: int) -> LaggedSums:
+        """Return those of a recording of so many instants, of one wheel or over several."""
+        return cls(products, pairs, pairs[0] * (instants - np.arange(len(pairs))) / instants)
+
+    @property
+    def count(self) -> float:
+        """Number of readings."""
+        return float(self.pairs[0])
+
+    def counted(self, last: int) -> Array:
+        """Return the autocorrelation at the lags from 1 to `last`, times the share of its pairs that were read.
+
+        Of a sensor that is read in every tenth row, readings are ten rows apart.
+        """
+        return np.asarray((self._share * self._correlation)[1 : last + 1])
+
+    def significant(self, thresholds: Thresholds) -> Array:
+        """Return the same to before the lag at which it first falls below its own standard error (Geyer, 1992).
+
+        Further lags would add variance to a sum over lags, and no bias.
+        """
+        standard_error = thresholds.lag_significance / np.sqrt(max(self.count, 1.0))
+        seen = self._share[1:] > LEAST_PAIRS
+        insignificant = np.flatnonzero((self._correlation[1:] < standard_error) & seen)
+        return self.counted(int(insignificant[0]) if insignificant.size else len(self.pairs) - 1)
+
+    @property
+    def _correlation(self) -> Array:
+        correlation = self.products / np.maximum(self.pairs, 1)
+        return np.asarray(correlation / (correlation[0] or 1.0))
+
+    @property
+    def _share(self) -> Array:
+        return np.asarray(self.pairs / np.maximum(self.allowed, 1e-300))
+
+
+def lagged_sums(residual: Array, mask: Mask, noise: NoiseModel, thresholds: Thresholds = THRESHOLDS) -> LaggedSums:
+    """Return the sums over all wheels of a residual [time, wheel] that is noise of a model's standard deviations."""
+    return _together(_sums_of_wheels(np.where(mask, residual, 0.0) / noise.deviation, mask, thresholds))
+
+
+def autocorrelation_times(each: Sequence[LaggedSums], thresholds: Thresholds = THRESHOLDS) -> Array:
+    """Return the autocorrelation times of several residuals of one kind, of wheels or of recordings, shape (residual,).
+
+    They differ from the one that is pooled over them by as much as they scatter beyond chance (James and Stein, 1961),
+    and upwards alone: none is believed more than all of them are. The relative variance of a sum over M lags is
+    2 (2 M + 1) / n (Madras and Sokal, 1988).
+    """
+    together = _together(each).significant(thresholds)
     pooled = max(1.0, 1 + 2 * float(np.sum(together)))
-    read = np.flatnonzero(pairs[0] > 0)
-    times, error = np.full(scaled.shape[1], pooled), np.zeros(scaled.shape[1])
-    for wheel in read if len(read) > 1 else ():
-        of_wheel = squares[:, wheel], pairs[:, wheel], len(scaled)
-        last = max(len(together), len(_significant(*of_wheel, thresholds)))
-        times[wheel] = max(1.0, 1 + 2 * float(np.sum(_counted(*of_wheel)[1 : last + 1])))
-        error[wheel] = 2 * (2 * last + 1) / float(pairs[0, wheel])
+    read = [place for place, sums in enumerate(each) if sums.count > 0]
+    times, error = np.full(len(each), pooled), np.zeros(len(each))
+    for place in read if len(read) > 1 else ():
+        last = max(len(together), len(each[place].significant(thresholds)))
+        times[place] = max(1.0, 1 + 2 * float(np.sum(each[place].counted(last))))
+        error[place] = 2 * (2 * last + 1) / each[place].count
     scatter = float(np.var(np.log(times[read]), ddof=1)) if len(read) > 1 else 0.0
     beyond_chance = max(1 - float(np.mean(error[read])) / scatter, 0.0) if scatter > 0 else 0.0
-    return pooled * np.maximum(times / pooled, 1.0) ** beyond_chance
+    return np.asarray(pooled * np.maximum(times / pooled, 1.0) ** beyond_chance)
 
 
 def significant_autocorrelation(scaled: Array, mask: NDArray[np.bool_], thresholds: Thresholds = THRESHOLDS) -> Array:
     """Return the autocorrelation at the lags from 1 on that are significant, shape (lag,), pooled over wheels.
-
-    It ends before the lag at which it first falls below its own standard error (Geyer, 1992): further lags would add
-    variance to a sum over lags, and no bias. A lag counts by the share of its pairs that were read: of a sensor that
-    is read in every tenth row, readings are ten rows apart.
 
     Parameters
     ----------
     scaled: residual over its standard deviation, shape (time, wheel); 0 where it is masked
     mask: what was read, of the same shape
     """
+    return _together(_sums_of_wheels(scaled, mask, thresholds)).significant(thresholds)
+
+
+def _sums_of_wheels(scaled: Array, mask: Mask, thresholds: Thresholds) -> list[LaggedSums]:
+    """Return the sums of each wheel of a residual over its standard deviation [time, wheel]."""
     lags = int(thresholds.longest_lag_share * len(scaled))
-    squares, pairs = _sums_over_lags(scaled, lags), _pairs(mask, lags)
-    return _significant(squares.sum(axis=1), pairs.sum(axis=1), len(scaled), thresholds)
+    products, pairs = _sums_over_lags(scaled, lags), _pairs(mask, lags)
+    return [LaggedSums.of(*of_wheel, len(scaled)) for of_wheel in zip(products.T, pairs.T, strict=True)]
 
 
-def _significant(squares: Array, pairs: Array, instants: int, thresholds: Thresholds) -> Array:
-    """Return the autocorrelation from lag 1 to before the first insignificant one, from sums over each lag's pairs."""
-    correlation, share = _correlation(squares, pairs), _share(pairs, instants)
-    standard_error = thresholds.lag_significance / np.sqrt(max(float(pairs[0]), 1.0))
-    insignificant = np.flatnonzero((correlation[1:] < standard_error) & (share[1:] > LEAST_PAIRS))
-    end = int(insignificant[0]) + 1 if insignificant.size else len(pairs)
-    return _counted(squares, pairs, instants)[1:end]
+def _together(each: Sequence[LaggedSums]) -> LaggedSums:
+    """Return the sums of several residuals; the longest has the most lags."""
+    lags = max(len(sums.pairs) for sums in each)
 
+    def total(name: str) -> Array:
+        found: Array = np.zeros(lags)
+        for sums in each:
+            values = getattr(sums, name)
+            found[: len(values)] += values
+        return found
 
-def _counted(squares: Array, pairs: Array, instants: int) -> Array:
-    """Return the autocorrelation at each lag times the share of its pairs that were read, shape (lag,)."""
-    return np.asarray(_share(pairs, instants) * _correlation(squares, pairs))
-
-
-def _correlation(squares: Array, pairs: Array) -> Array:
-    correlation = squares / np.maximum(pairs, 1)
-    return correlation / (correlation[0] or 1.0)
-
-
-def _share(pairs: Array, instants: int) -> Array:
-    """Return the share of the readings that have another one so much later, of those that the end allows."""
-    return pairs / max(float(pairs[0]), 1.0) * instants / (instants - np.arange(len(pairs)))
+    return LaggedSums(total("products"), total("pairs"), total("allowed"))
 
 
 def _deviation(clean: Array, mask: NDArray[np.bool_]) -> Array:

@@ -280,6 +280,30 @@ def test_what_one_recording_shows_is_reported_with_it(tmp_path: Path) -> None:
     assert effect.rovers == ("a",)
 
 
+def test_a_curve_without_a_name_has_its_rovers_and_its_date(tmp_path: Path) -> None:
+    """One that single recordings do not show, and that no law of the library is."""
+    hump: list[Mapping[str, Any]] = [{}, {}, {"hump": 0.06}, {"hump": 0.06}, {"hump": 0.06}]
+    answer = compared(tmp_path, {"a": hump, "b": NOTHING, "c": hump}).answer
+    (rest,) = answer.unexplained
+    assert (answer.verdict, answer.effects) == ("unexplained", ())
+    assert (rest.covariate, rest.rovers, len(rest.recordings)) == ("wheel_speed", ("a", "c"), 6)
+    assert (rest.since, rest.until) == (day(2, 0), None)
+    assert rest.told_where == "6 recordings of a and c since 2026-03-15 08:00"
+    assert answer.fit.held_out_rmse_after < answer.fit.held_out_rmse_before
+    assert answer.probability is not None
+
+
+def test_what_the_last_recording_shows_by_itself_is_carried_over(tmp_path: Path) -> None:
+    """The corrected simulation of a rover is as it is in its last recording."""
+    drives: list[Mapping[str, Any]] = [{}, {}, {}, {"coulomb": (0.3, 0.0)}]
+    found = compared(tmp_path, {"a": drives})
+    (effect,) = found.answer.effects
+    found.write_corrected(tmp_path / "NEW.toml")
+    (carried,) = tomllib.loads((tmp_path / "NEW.toml").read_text(encoding="utf-8"))["effects"]
+    assert (carried["name"], carried["wheels"]) == (effect.name, ["elbow"])
+    assert carried["coefficients"][0] == pytest.approx(0.3, rel=0.2)
+
+
 def test_a_list_of_tables_is_compared_together() -> None:
     """In Python: `compare([one, two, …], simulation)`, without a word on rovers and dates."""
     found = compare([fleet_arm.columns(n, (0.2, 0.2)) for n in range(2)], fleet_arm.Arm())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
+from regolithd.calibration.mismatch.signal.hat_basis import hat_functions, hat_functions_at, range_of
 
 VALUES = np.random.default_rng(0).exponential(size=(500, 3))
 
@@ -65,3 +65,11 @@ def test_hats_are_straight_lines_between_knots() -> None:
     knots = 0.5 * (np.quantile(inside, np.linspace(0.005, 0.995, 5)) + np.linspace(low, high, 5))
     for hat, row in zip(hats, np.eye(5), strict=True):
         np.testing.assert_allclose(hat, np.interp(VALUES, knots, row), atol=1e-12)
+
+
+def test_knots_may_be_given() -> None:
+    """Beyond the outermost ones a function is constant."""
+    at, known = np.array([0.5, 1.0, 2.0]), np.ones(VALUES.shape, bool)
+    hats = hat_functions_at(VALUES, known, at)
+    np.testing.assert_allclose(np.tensordot(at, hats, axes=1), np.clip(VALUES, 0.5, 2.0))
+    assert range_of(VALUES) == pytest.approx(np.quantile(VALUES, [0.005, 0.995]))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 
+from regolithd.calibration.mismatch import compare
+from regolithd.calibration.mismatch.answer import Parameter, Range, Unexplained
 from regolithd.calibration.validation.lisdd import lisdd
 from regolithd.calibration.validation.region_study.__main__ import bias, figures_of, table
-from regolithd.calibration.validation.region_study.machines import MACHINES, Case, Group, Machine, case_of
+from regolithd.calibration.validation.region_study.machines import MACHINES, Case, Group, Machine, Stated, case_of
 from regolithd.calibration.validation.region_study.picture import picture
-from regolithd.calibration.validation.region_study.score import METHODS, Score, scores_of
+from regolithd.calibration.validation.region_study.score import METHODS, Score, rows_of, scores_of
 
 
 @pytest.mark.parametrize(("machine", "group"), [*product(MACHINES, ("one", "two"))])
@@ -62,6 +65,17 @@ def test_the_engine_tells_the_region_and_is_not_biased_by_it() -> None:
 def score(method: str, error: float, *, f1: float = 0.5, group: str = "one") -> Score:
     """Return a score."""
     return Score(method, "pump", group, correlated=False, f1=f1, told=True, errors=(error, 0.02), bounds_held=(1, 2))
+
+
+def test_a_range_may_be_of_the_size_of_the_prediction() -> None:
+    """Which is no recorded column: it is what the machine's law predicts."""
+    case = case_of(MACHINES[1], 1, "none", correlated=False)
+    beyond = Range("power", Parameter(450.0, 440.0, 460.0, "W"), None, "beyond 450 W")
+    rest = Unexplained("power_W", (1,), "power", 0.0, 60.0, 0.2, range=beyond)
+    answer = replace(compare(case.recorded, Stated(case.machine)).answer, effects=(), unexplained=(rest,))
+    predicted = Stated(case.machine).predict(case.recorded, case.true)
+    assert np.array_equal(rows_of(answer, case), np.abs(predicted) >= 450.0)
+    assert 0 < rows_of(answer, case).sum() < len(predicted)
 
 
 def test_bias_is_of_the_mean_and_not_of_single_errors() -> None:

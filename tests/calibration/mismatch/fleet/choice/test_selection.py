@@ -205,7 +205,7 @@ def test_an_effect_of_one_recording_is_not_confirmed_by_the_others() -> None:
     """What gains enough only through one of five recordings is none of the rover."""
     of = equations({2: on_both(1, 1.0), **{n: on_both(4, 0.1) for n in range(0, 10, 2)}})
     of_one, of_all = term(DRAG, Course("always")), term(WAVE, Course("always"))
-    found = chooser(of)._confirmed(of.fit((of_one, of_all)))
+    found = chooser(of).confirmed(of.fit((of_one, of_all)))
     assert found.terms == (of_all,)
     assert found.delta_chi2 == pytest.approx(of.fit((of_all,)).delta_chi2)
 
@@ -239,14 +239,14 @@ def test_two_recordings_cannot_confirm_an_effect_and_three_can() -> None:
     for count, kept in ((2, 1), (3, 0)):
         concealed: list[dict[tuple[int, int], float]] = [{}] * (count - 1) + [on_both(1, 1.0)]
         of = equations_of([drive(n, each) for n, each in enumerate(concealed)], (0,) * count)
-        assert len(chooser(of)._confirmed(of.fit((term(DRAG, Course("always")),))).terms) == kept
+        assert len(chooser(of).confirmed(of.fit((term(DRAG, Course("always")),))).terms) == kept
 
 
 def test_an_effect_is_searched_anew_beside_a_later_one() -> None:
     """One that was taken for the fleet's belongs to the rover that has it, once that fits better."""
     of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
     taken = of.fit((term(DRAG, Course("always"), rovers=(0, 1)),))
-    assert told(chooser(of)._searched_anew(taken, places_of(of)).terms) == [
+    assert told(chooser(of).searched_anew(taken, places_of(of)).terms) == [
         ("steady-drag", "all", (0,), (0, 1), "always", 0)
     ]
 
@@ -255,7 +255,7 @@ def test_what_cannot_be_improved_stays() -> None:
     """Only a better score replaces an effect."""
     of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
     fit = of.fit((term(DRAG, Course("always")), term(WEAR, Course("since", 4), wheels=(0,))))
-    assert chooser(of)._searched_anew(of.fit(fit.terms[:1]), places_of(of)).terms == fit.terms[:1]
+    assert chooser(of).searched_anew(of.fit(fit.terms[:1]), places_of(of)).terms == fit.terms[:1]
     assert without(fit, 0) == fit.terms[1:]
     assert without(fit, 1) == fit.terms[:1]
 

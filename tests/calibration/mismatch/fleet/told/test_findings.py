@@ -12,7 +12,20 @@ import numpy as np
 import pytest
 from golden import assert_golden, rounded
 from sample_answer import WORN
-from synthetic_fleet import DEVIATION, DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
+from synthetic_fleet import (
+    COLUMNS,
+    CURVE,
+    DEVIATION,
+    DRAG,
+    GROUPS,
+    KNOTS,
+    WAVE,
+    WEAR,
+    drive,
+    equations_of,
+    on_both,
+    term,
+)
 
 from regolithd.calibration.mismatch.answer import Unexplained
 from regolithd.calibration.mismatch.candidates.stribeck_friction import StribeckFriction
@@ -22,7 +35,7 @@ from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equation
 from regolithd.calibration.mismatch.fleet.choice.search import penalty, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
-from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
+from regolithd.calibration.mismatch.fleet.told.findings import NOT_CONFIRMED, Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.inference.findings import Findings
 from regolithd.calibration.mismatch.problem.prior import Prior
@@ -47,9 +60,10 @@ class Machine(Simulation):
     parameters: ClassVar = {"gain": Prior(1.5, 0.2, "A/A"), "offset": Prior(0.1, 0.0, "A")}
 
 
-def found(findings: Findings = SILENT, *terms: FoundTerm) -> Found:
+def found(findings: Findings = SILENT, *terms: FoundTerm, last_s: float = 0.0) -> Found:
     """Return what one recording was found to show."""
-    return Found(findings, {}, DEVIATION, 1.0, float(np.sqrt(np.mean(DEVIATION**2))), 8.0, terms, {})
+    floor = float(np.sqrt(np.mean(DEVIATION**2)))
+    return Found(findings, {}, DEVIATION, 1.0, floor, 8.0, terms, {}, last_s=last_s)
 
 
 def chosen(
@@ -280,3 +294,29 @@ def test_on_a_machine_of_one_wheel_a_fault_of_one_wheel_is_one_of_a_rover() -> N
         each.name: each.smallest_detectable for each in answer_of_fleet(chosen(equations, (), one.found)).sensitivity
     }
     assert np.isfinite(told["wear"])
+
+
+def test_a_curve_is_told_with_its_recordings_and_their_dates() -> None:
+    """And how much of what the recordings leave without it, it is."""
+    bend = {place: size for knot in range(KNOTS) for place, size in on_both(COLUMNS + knot, 0.1 * (-1) ** knot).items()}
+    drives = [drive(n, bend if n in {4, 6} else {}, COLUMNS + KNOTS) for n in range(8)]
+    of = chosen(equations_of(drives, ROVER), (term(CURVE, Course("since", 4)),), [found(last_s=n) for n in range(8)])
+    answer = answer_of_fleet(of)
+    (rest,) = answer.unexplained
+    assert (answer.verdict, answer.effects) == ("unexplained", ())
+    assert (rest.covariate, rest.rovers, rest.recordings) == ("load", ("rover 0",), ("drive 4", "drive 6"))
+    assert (rest.since, rest.until, rest.to_s) == ("2026-03-05T08:00:00Z", None, 6.0)
+    assert rest.told_where == "2 recordings of rover 0 since 2026-03-05 08:00"
+    own, noise = KNOTS * 0.1**2, float(np.mean(DEVIATION**2))
+    assert rest.share_of_residual == pytest.approx(own / (own + noise), rel=0.15)
+
+
+def test_an_error_that_does_not_fall_is_told() -> None:
+    """What acts in one recording of a rover has no other that could confirm it."""
+    drives = [drive(n, on_both(1, 0.4) if n == 6 else {}) for n in range(8)]
+    equations = equations_of(drives, ROVER, "recording")
+    in_one = answer_of_fleet(chosen(equations, (term(DRAG, Course("since", 6)),), [found()] * 8))
+    assert in_one.notes[-1] == NOT_CONFIRMED
+    drives = [drive(n, on_both(1, 0.4)) for n in range(8)]
+    in_all = chosen(equations_of(drives, ROVER), (term(DRAG, Course("always"), (0, 1)),), [found()] * 8)
+    assert NOT_CONFIRMED not in answer_of_fleet(in_all).notes

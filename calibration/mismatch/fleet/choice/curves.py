@@ -1,0 +1,91 @@
+"""Names of a fleet against curves that its recordings have in common: what stays unexplained in all of them together.
+
+As in one recording (`selection.smooth_terms`), a curve wins in two ways: beside the names, where it explains much that
+they leave; and against them, where it scores more than they do, which then only imitate it. A curve needs no recording
+that shows it by itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.fleet.choice.search import further
+from regolithd.calibration.mismatch.fleet.choice.selection import without
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
+
+TRIED = 3
+"""Curves that are tried, the best first (a choice: the best may be refused by other recordings)."""
+
+
+def with_curves(chooser: Chooser, fit: FleetFit) -> FleetFit:
+    """Return the names that keep theirs, and the curves that they leave."""
+    against = max(_against(chooser, fit), key=chooser.evidence, default=fit)
+    fit = against if _is_ahead(chooser, against, fit) else fit
+    while (more := max(_beside(chooser, fit), key=chooser.evidence, default=fit)) is not fit:
+        fit = more
+    return fit
+
+
+def _against(chooser: Chooser, fit: FleetFit) -> Iterator[FleetFit]:
+    """Yield the fits of a curve alone with the names that may stand beside it."""
+    for alone in _with_one_more(chooser, chooser.equations.fit(())) if fit.terms else ():
+        if (standing := _standing(chooser, chooser.grown(alone, chooser.places))).curves:
+            yield standing
+
+
+def _is_ahead(chooser: Chooser, curve: FleetFit, named: FleetFit) -> bool:
+    """Return whether a fit with a curve is ahead of names by more than chance, and by more than their laws' misfit.
+
+    Laws that are a little wrong are behind a curve as well, where there are many readings.
+    """
+    misfit = (curve.delta_chi2 - named.delta_chi2) / max(curve.delta_chi2, 1e-9)
+    ahead = chooser.evidence(curve) - chooser.evidence(named)
+    return misfit > THRESHOLDS.form_misfit and ahead > THRESHOLDS.smooth_term_entry
+
+
+def _beside(chooser: Chooser, fit: FleetFit) -> Iterator[FleetFit]:
+    """Yield the fits with a further curve, beside which names that gain little are left out.
+
+    What has no law leaks into every law. A curve that gains little is the names' misfit.
+    """
+    for more in _with_one_more(chooser, fit):
+        gain = more.delta_chi2 - fit.delta_chi2
+        if gain >= THRESHOLDS.form_misfit * more.delta_chi2:
+            standing = _standing(chooser, _without_little(chooser, more, THRESHOLDS.beside_smooth_share * gain))
+            if len(standing.curves) > len(fit.curves) and chooser.evidence(standing) > chooser.evidence(fit):
+                yield standing
+
+
+def _with_one_more(chooser: Chooser, fit: FleetFit) -> Iterator[FleetFit]:
+    """Yield the fits with one of the best further curves that are significant, in its best place beside all others."""
+    equations = chooser.equations
+    for score, curve in further(equations, fit, chooser.places, equations.curve_groups)[:TRIED]:
+        if score > THRESHOLDS.smooth_term_entry:
+            yield chooser.searched_anew(equations.fit((*fit.terms, curve)), chooser.places)
+
+
+def _without_little(chooser: Chooser, fit: FleetFit, least: float) -> FleetFit:
+    """Return a fit without the names that gain less than this."""
+    kept = [
+        term
+        for place, term in enumerate(fit.terms)
+        if not term.group.named or fit.delta_chi2 - chooser.equations.fit(without(fit, place)).delta_chi2 >= least
+    ]
+    return fit if len(kept) == len(fit.terms) else chooser.equations.fit(kept)
+
+
+def _standing(chooser: Chooser, fit: FleetFit) -> FleetFit:
+    """Return a fit without what may not be told, or is not confirmed by other recordings; those with a name first."""
+    fit = chooser.equations.fit((*fit.named, *fit.curves))
+    while fit.terms:
+        refused = [place for place in range(len(fit.terms)) if not chooser.acceptable_term(fit, place)]
+        if not refused:
+            break
+        fit = chooser.equations.fit(without(fit, refused[0]))
+    return chooser.confirmed(fit)

@@ -1,0 +1,91 @@
+"""Curves that the recordings of a fleet have in common, against its names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from synthetic_fleet import COLUMNS, CURVE, DRAG, KNOTS, Drive, drive, equations_of, on_both, term
+
+from regolithd.calibration.mismatch.fleet.choice.courses import Course
+from regolithd.calibration.mismatch.fleet.choice.curves import with_curves
+from regolithd.calibration.mismatch.fleet.choice.search import places_of
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
+
+ROVER = (0, 1) * 4
+"""Whose each of eight recordings is."""
+BEND = {place: size for knot in range(KNOTS) for place, size in on_both(COLUMNS + knot, 0.03 * (-1) ** knot).items()}
+"""A curve on both wheels, a fifth of the noise at each knot."""
+
+
+def drives(concealed: Sequence[Mapping[tuple[int, int], float]]) -> list[Drive]:
+    """Return recordings with these effects, and the columns of a curve."""
+    return [drive(seed, each, COLUMNS + KNOTS) for seed, each in enumerate(concealed)]
+
+
+def chosen(of: Sequence[Drive]) -> tuple[FleetFit, FleetFit]:
+    """Return the names that are chosen alone, and what is chosen of names and curves."""
+    equations = equations_of(of, ROVER)
+    chooser = Chooser(equations, places_of(equations), 8.0)
+    names = chooser.chosen()
+    return names, with_curves(chooser, names)
+
+
+def test_a_curve_of_all_recordings_is_found_without_a_name() -> None:
+    """One too weak for a single recording, on both rovers, from the start."""
+    names, found = chosen(drives([BEND] * 8))
+    assert names.terms == ()
+    assert found.terms == (term(CURVE, Course("always"), (0, 1)),)
+    assert found.coefficients[found.spans[0]] == pytest.approx([0.03 * (-1) ** knot for knot in range(KNOTS)], abs=0.02)
+
+
+def test_a_curve_of_one_rover_has_its_rover_and_its_date() -> None:
+    """Since its third recording."""
+    (found,) = chosen(drives([{}, {}, {}, {}, BEND, {}, BEND, {}]))[1].terms
+    assert (found.group, found.units.rovers, found.course) == (CURVE, (0,), Course("since", 4))
+
+
+def test_nothing_has_no_curve() -> None:
+    """Nor a name."""
+    assert chosen(drives([{}] * 8))[1].terms == ()
+
+
+def test_a_law_keeps_its_name_where_a_curve_explains_no_more() -> None:
+    """A curve beside it would pay for eight coefficients."""
+    names, found = chosen(drives([on_both(1, 0.1)] * 8))
+    assert names.terms == found.terms == (term(DRAG, Course("always"), (0, 1)),)
+
+
+def test_a_name_beside_a_curve_keeps_its_name() -> None:
+    """Where it gains what a name has to, and the curve is of something else."""
+    found = chosen(drives([{**BEND, **on_both(1, 0.1)}] * 8))[1]
+    assert found.named == (term(DRAG, Course("always"), (0, 1)),)
+    assert found.curves == (term(CURVE, Course("always"), (0, 1)),)
+    assert found.terms == (*found.named, *found.curves)
+
+
+def test_a_name_that_imitates_a_curve_goes() -> None:
+    """A part of what the curve explains leaks into a law whose column is like one of its knots."""
+    imitated = []
+    for each in drives([BEND] * 8):
+        columns = each.columns.copy()
+        columns[1] = 0.8 * sum((-1) ** knot * columns[COLUMNS + knot] for knot in range(KNOTS)) / np.sqrt(KNOTS)
+        columns[1] += 0.6 * each.columns[1]
+        imitated.append(Drive(columns, each.residual))
+    names, found = chosen(imitated)
+    assert [each.name for each in names.terms] == ["steady-drag"]
+    assert found.terms == (term(CURVE, Course("always"), (0, 1)),)
+
+
+def test_a_rover_shows_a_curve_by_all_of_its_knots_together() -> None:
+    """One knot that is far from 0 by chance is none."""
+    equations = equations_of(drives([BEND if rover == 0 else {} for rover in ROVER]), ROVER)
+    chooser = Chooser(equations, places_of(equations), 1.0)
+    fit = equations.fit((term(CURVE, Course("always"), (0, 1)),))
+    assert chooser.showing(fit, 0) == (0,)
