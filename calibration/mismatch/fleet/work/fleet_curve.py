@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient
-from regolithd.calibration.mismatch.candidates.late_columns import bridged
-from regolithd.calibration.mismatch.problem.state.state_memory import memory_s, through_state
-from regolithd.calibration.mismatch.regression.groups.smooth_groups import acting, couplings_of
-from regolithd.calibration.mismatch.regression.groups.state_groups import ON_STATE
+from regolithd.calibration.mismatch.problem.state.state_memory import longest_memory_s, through_state
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import acting
+from regolithd.calibration.mismatch.regression.groups.state_groups import ON_STATE, acting_on_state
 from regolithd.calibration.mismatch.signal.hat_basis import hat_functions_at
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -24,6 +23,15 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
+
+
+def memory_of(problem: Problem) -> float:
+    """Return the memory of a simulation's state [s]; 0 where it has none, or one that is longer than the recording.
+
+    In one recording what acts on a state that remembers a fifth of it looks like a drift. In several it does not.
+    """
+    memory = longest_memory_s(problem)
+    return memory if memory < problem.length_s else 0.0
 
 
 class FleetCurve(Candidate):
@@ -41,15 +49,13 @@ class FleetCurve(Candidate):
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the hat functions of its knots, shape (knot, time, wheel); none without the covariate or a state."""
         over, coupling = str(shape["over"]), str(shape["coupling"])
-        memory = memory_s(problem) if coupling == ON_STATE else 0.0
+        memory = memory_of(problem) if coupling == ON_STATE else 0.0
         if over not in problem.covariates or (coupling == ON_STATE and memory == 0):
             return np.zeros((0, *problem.mask.shape))
         at = np.linspace(float(shape["low"]), float(shape["high"]), len(self.coefficients))
-        if coupling != ON_STATE:
-            values, factor = acting(problem, over, coupling)
-            return np.stack(hat_functions_at(values, problem.mask, at)) * factor
-        couplings, values = couplings_of(problem), problem.covariates[over]
-        factor = np.nan_to_num(bridged(couplings["drag" if "drag" in couplings else "offset"]))
-        known = bridged(np.abs(values) if over == "wheel_speed" else values)
-        hats = hat_functions_at(known, np.isfinite(known), at)
-        return np.stack([through_state(problem, hat * factor, memory) for hat in hats])
+        if coupling == ON_STATE:
+            followed, factor = acting_on_state(problem, over)
+            hats = hat_functions_at(followed, np.isfinite(followed), at)
+            return np.stack([through_state(problem, hat * factor, memory) for hat in hats])
+        followed, factor = acting(problem, over, coupling)
+        return np.stack(hat_functions_at(followed, problem.mask, at)) * factor

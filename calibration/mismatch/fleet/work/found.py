@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.comparison import decided
+from regolithd.calibration.mismatch.fleet.work.fleet_curve import memory_of
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, contribution_of
 from regolithd.calibration.mismatch.inference.findings import noise_floor
 from regolithd.calibration.mismatch.inference.other_answers.probability import leads_of
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import as_followed
 from regolithd.calibration.mismatch.regression.groups.state_groups import ON_STATE
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.hat_basis import range_of
@@ -182,14 +184,16 @@ def _ranges(decision: Decision) -> dict[str, tuple[float, float]]:
         if name in problem.covariates:
             values = problem.covariates[name]
             known = values[problem.mask & np.isfinite(values)]
-            found[name] = range_of(np.abs(known) if name == "wheel_speed" else known)
+            found[name] = range_of(as_followed(name, known))
     return found
 
 
 def _usual_coupling(decision: Decision) -> str:
     """Return how a smooth term acts: on a state, where the simulation has one that remembers; else along the motion."""
+    if memory_of(decision.equations.problem) > 0:
+        return ON_STATE
     couplings = {group.coupling for group in decision.equations.design.groups if not group.named}
-    return next((each for each in (ON_STATE, "drag") if each in couplings), "offset")
+    return "drag" if "drag" in couplings else "offset"
 
 
 def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str, Responses]:

@@ -59,8 +59,7 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     couplings = couplings_of(problem)
     for name, values in problem.covariates.items():
         if has_smooth_term(problem, name) and varies_with_time(problem, values):
-            curve = np.abs(values) if name == "wheel_speed" else values
-            hats = hat_functions(curve, problem.mask, problem.thresholds.curve_knots)
+            hats = hat_functions(as_followed(name, values), problem.mask, problem.thresholds.curve_knots)
             for coupling, factor, sharing in (
                 _ways_to_act(problem, name, couplings) if len(hats) >= FEWEST_KNOTS else ()
             ):
@@ -74,6 +73,11 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     coupling = "drag" if "drag" in couplings else "offset"
     hats = hat_functions(problem.covariates["time"], problem.mask, problem.thresholds.time_knots)
     return with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
+
+
+def as_followed(covariate: str, values: Array) -> Array:
+    """Return values of a covariate as a smooth term follows them: of a speed, how large it is."""
+    return np.abs(values) if covariate == "wheel_speed" else values
 
 
 def _with_constant_share(design: DesignMatrix, prediction: Array) -> DesignMatrix:
@@ -155,7 +159,7 @@ def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Arra
     values = problem.covariates[covariate]
     if coupling == "each way":
         return values, np.ones(values.shape)
-    values = np.abs(values) if covariate == "wheel_speed" else values
+    values = as_followed(covariate, values)
     couplings = couplings_of(problem)
     if coupling in couplings:
         return values, couplings[coupling]
@@ -268,7 +272,7 @@ def _with_sines_over_covariates(design: DesignMatrix, residual: Array) -> Design
     for name, signed in problem.covariates.items():
         if name == "time" or not has_smooth_term(problem, name) or not varies_with_time(problem, signed):
             continue
-        values = np.abs(signed) if name == "wheel_speed" else signed
+        values = as_followed(name, signed)
         known = problem.mask & np.isfinite(values)
         low, high = np.quantile(values[known], USUAL)
         if not high > low:

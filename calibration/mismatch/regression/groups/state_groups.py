@@ -9,10 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.late_columns import bridged
 from regolithd.calibration.mismatch.problem.state.state_memory import memory_s, through_state
 from regolithd.calibration.mismatch.regression.groups.smooth_groups import (
+    as_followed,
     couplings_of,
     has_smooth_term,
     varies_with_time,
@@ -21,7 +23,10 @@ from regolithd.calibration.mismatch.regression.groups.smooth_groups import (
 from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
 
 if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+
+Array = NDArray[np.float64]
 
 ON_STATE = "on a state"
 """Coupling of these terms."""
@@ -36,14 +41,23 @@ def with_state_terms(design: DesignMatrix) -> DesignMatrix:
     memory = memory_s(problem)
     if memory == 0:
         return design
-    couplings, limits = couplings_of(problem), problem.thresholds
-    factor = couplings["drag" if "drag" in couplings else "offset"]
+    limits = problem.thresholds
     for name, values in problem.covariates.items():
         if not has_smooth_term(problem, name) or not varies_with_time(problem, values):
             continue
-        known = bridged(np.abs(values) if name == "wheel_speed" else values)
+        followed, factor = acting_on_state(problem, name)
         knots = limits.state_time_knots if name == "time" else limits.curve_knots
-        hats = hat_functions(known, np.isfinite(known), knots)
-        columns = [through_state(problem, hat * np.nan_to_num(bridged(factor)), memory) for hat in hats]
+        hats = hat_functions(followed, np.isfinite(followed), knots)
+        columns = [through_state(problem, hat * factor, memory) for hat in hats]
         design = with_group(design, name, columns, ON_STATE)
     return design
+
+
+def acting_on_state(problem: Problem, covariate: str) -> tuple[Array, Array]:
+    """Return a covariate as such a term follows it, and the factor by which that acts, shape (time, wheel) each.
+
+    A state remembers what was before a blank: both have straight lines across blanks.
+    """
+    couplings = couplings_of(problem)
+    factor = couplings["drag" if "drag" in couplings else "offset"]
+    return bridged(as_followed(covariate, problem.covariates[covariate])), np.nan_to_num(bridged(factor))
