@@ -311,7 +311,7 @@ def _of_channel(
         del searched  # memory holds the sums of one search at a time
         searched = compared.searched(finer, load, channel, level, work)
     chooser, results = searched.chooser, searched.found
-    fit = earned(chooser, with_curves(chooser, searched.fit), results)
+    fit = earned(chooser, with_curves(chooser, searched.fit, results, simulation.parameters), results)
     chooser = replace(chooser, equations=with_released(chooser.equations, fit, results, simulation.parameters))
     fit = earned(chooser, chooser.equations.fit(fit.terms), results)  # a released parameter may act as a name does
     return Chosen(chooser, fit, searched.names, results, simulation)

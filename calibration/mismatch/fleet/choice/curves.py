@@ -9,22 +9,42 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import further
 from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping, Sequence
 
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
     from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
+    from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.problem.prior import Prior
 
 TRIED = 3
 """Curves that are tried, the best first (a choice: the best may be refused by other recordings)."""
 
 
-def with_curves(chooser: Chooser, fit: FleetFit) -> FleetFit:
-    """Return the names that keep theirs, and the curves that they leave."""
+def with_curves(chooser: Chooser, fit: FleetFit, found: Sequence[Found], priors: Mapping[str, Prior]) -> FleetFit:
+    """Return the names that keep theirs, and the curves that they leave.
+
+    No curves where parameters that were stated wrongly explain as much of them as a law does that is a little wrong.
+    """
+    told = _told(chooser, fit)
+    if not told.curves:
+        return fit
+    held, freed = chooser.equations, with_released(chooser.equations, fit, found, priors)
+    explained = held.explained(fit, ())
+    by_curves, by_parameters = (
+        held.explained(told, ()) - explained,
+        freed.explained(freed.fit(fit.terms), ()) - explained,
+    )
+    stated_wrongly = freed is not held and by_parameters >= (1 - THRESHOLDS.form_misfit) * by_curves
+    return fit if stated_wrongly else told
+
+
+def _told(chooser: Chooser, fit: FleetFit) -> FleetFit:
     against = max(_against(chooser, fit), key=chooser.evidence, default=fit)
     fit = against if _is_ahead(chooser, against, fit) else fit
     while (more := max(_beside(chooser, fit), key=chooser.evidence, default=fit)) is not fit:

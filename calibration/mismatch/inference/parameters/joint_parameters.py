@@ -149,6 +149,14 @@ def joint_posterior(
     return max(plausible, key=lambda each: each.evidence, default=within)
 
 
+def gained_by_release(priors: Mapping[str, Prior], informations: Sequence[Information]) -> dict[str, float]:
+    """Return the evidence that releasing each told parameter by itself gains, what a wrong statement costs included."""
+    likelihood = Likelihood.of(priors, informations)
+    within = likelihood.posterior(()).evidence
+    told = [(place, name) for place, name in enumerate(likelihood.names) if priors[name].told]
+    return {name: likelihood.posterior((place,)).evidence - within for place, name in told}
+
+
 def known_better_by_others(
     own: JointPosterior, others: JointPosterior, priors: Mapping[str, Prior]
 ) -> dict[str, tuple[float, float]]:

@@ -6,12 +6,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from synthetic_fleet import COLUMNS, CURVE, DRAG, KNOTS, Drive, drive, equations_of, on_both, term
+from sample_answer import FINDINGS
+from synthetic_fleet import (
+    COLUMNS,
+    CURVE,
+    DEVIATION,
+    DRAG,
+    KNOTS,
+    PRIOR_STD,
+    Drive,
+    drive,
+    equations_of,
+    on_both,
+    term,
+)
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.curves import with_curves
-from regolithd.calibration.mismatch.fleet.choice.search import places_of
+from regolithd.calibration.mismatch.fleet.choice.search import further, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+from regolithd.calibration.mismatch.fleet.work.found import Found
+from regolithd.calibration.mismatch.problem.prior import Prior
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,7 +49,8 @@ def chosen(of: Sequence[Drive]) -> tuple[FleetFit, FleetFit]:
     equations = equations_of(of, ROVER)
     chooser = Chooser(equations, places_of(equations), 8.0)
     names = chooser.chosen()
-    return names, with_curves(chooser, names)
+    found = [Found(FINDINGS, {}, DEVIATION, 1.0, 0.1, 10.0, (), {})] * len(of)
+    return names, with_curves(chooser, names, found, {"gain": Prior(1.5, PRIOR_STD, "A/A")})
 
 
 def test_a_curve_of_all_recordings_is_found_without_a_name() -> None:
@@ -81,6 +97,19 @@ def test_a_name_that_imitates_a_curve_goes() -> None:
     names, found = chosen(imitated)
     assert [each.name for each in names.terms] == ["steady-drag"]
     assert found.terms == (term(CURVE, Course("always"), (0, 1)),)
+
+
+def test_a_parameter_that_was_stated_wrongly_is_no_curve() -> None:
+    """One of which the tangent is like a curve: the prior holds it, and the curve would explain the rest."""
+    wrong = []
+    for each in drives([{}] * 8):
+        columns = each.columns.copy()
+        columns[0] = 0.1 * sum(columns[COLUMNS + knot] for knot in range(KNOTS)) / np.sqrt(KNOTS)
+        wrong.append(Drive(columns, each.residual + 6 * PRIOR_STD * columns[0]))
+    equations = equations_of(wrong, ROVER)
+    (_, best), *_ = further(equations, equations.fit(()), places_of(equations), equations.curve_groups)
+    assert best.group == CURVE
+    assert chosen(wrong)[1].terms == ()
 
 
 def test_a_rover_shows_a_curve_by_all_of_its_knots_together() -> None:

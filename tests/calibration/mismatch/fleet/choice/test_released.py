@@ -66,3 +66,14 @@ def test_a_parameter_is_not_released_beside_something_unexplained() -> None:
     """It may stand for a part of that."""
     of, found = season(curve=True)
     assert with_released(of, of.fit(()), found, PRIORS) is of
+
+
+@pytest.mark.parametrize(
+    ("wrong", "released"), [((5.0, 5.0, 2.6), {0, 1, 2}), ((5.0, 0.0, 2.6), {0}), ((3.6, 3.6, 3.6), {0, 1, 2})]
+)
+def test_what_most_rovers_contradict_holds_none_of_them(wrong: tuple[float, ...], released: set[int]) -> None:
+    """One value is stated for all; the third rover, by itself, hardly contradicts it."""
+    sums = [weak(n, wrong[n % 3] * PRIOR_STD).sums() for n in range(6)]
+    of = fleet_equations(sums, (0, 1, 2) * 2, range(6), GROUPS, "rover")
+    found = [Found(FINDINGS, {}, DEVIATION, 1.0, 0.1, 10.0, (), {})] * 6
+    assert with_released(of, of.fit(()), found, PRIORS).released == released
