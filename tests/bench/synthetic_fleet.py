@@ -73,7 +73,8 @@ DRAG, WEAR, WAVE = GROUPS
 COLUMNS = 5
 """The tangent of `gain`, and the candidates' columns."""
 KNOTS = len(FleetCurve.coefficients)
-CURVE = GridGroup(FleetCurve(), {"over": "load"}, tuple(range(COLUMNS, COLUMNS + KNOTS)), 1)
+BEND: dict[str, float | str] = {"over": "load", "coupling": "offset", "low": 0.0, "high": 7.0}
+CURVE = GridGroup(FleetCurve(), BEND, tuple(range(COLUMNS, COLUMNS + KNOTS)), 1)
 """A curve, whose columns come after those."""
 
 

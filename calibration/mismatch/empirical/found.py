@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.empirical.sums import points_beside, profile
 from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.groups.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.groups.smooth_groups import PERIODIC, SINES
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import EACH_WAY, PERIODIC, SINES, follows_size
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-EACH_WAY, ALONG = "each way", "drag, "
-"""Coupling of a function of the signed speed, and the beginning of those that act oppositely on two parts."""
+ALONG = "drag, "
+"""The beginning of the couplings that act oppositely on two parts."""
 X = re.compile(r"(?<![a-z])x(?![a-z])")
 """The covariate in the text of a form."""
 TIMES = re.compile(r"\b([cd]) (?=[a-z√|(])(?!where)")
@@ -123,8 +123,7 @@ def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, 
     coupling, reach = term.group.coupling, NINETY_PERCENT_STDS * spline.std
     return EmpiricalCurve(
         coupling=coupling,
-        # A speed counts by its magnitude, except where it acts one way only.
-        magnitude=term.name == "wheel_speed" and coupling != EACH_WAY,
+        magnitude=follows_size(term.name, coupling),
         unit="1" if coupling == "gain" else problem.simulation.unit,
         covariate_unit=unit_in_label(term.name, problem.labels),
         at=tuple(spline.at.tolist()),

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Verdict
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
+    from regolithd.calibration.mismatch.fleet.told.chosen import Chosen
     from regolithd.calibration.mismatch.fleet.told.estimates import Estimate
-    from regolithd.calibration.mismatch.fleet.told.findings import Chosen
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.corrected import acting_last, write_corrected
 from regolithd.calibration.mismatch.fleet.evidence import FleetEvidence
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
-from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
+from regolithd.calibration.mismatch.fleet.told.chosen import Chosen, Names
+from regolithd.calibration.mismatch.fleet.told.findings import answer_of_fleet
 from regolithd.calibration.mismatch.fleet.told.joint import joint_parameters
 from regolithd.calibration.mismatch.fleet.work.curves import with_curves_of
 from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
-    from regolithd.calibration.mismatch.fleet.told.findings import Chosen
+    from regolithd.calibration.mismatch.fleet.told.chosen import Chosen
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]

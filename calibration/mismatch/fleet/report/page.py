@@ -65,6 +65,7 @@ def fleet_report(answer: FleetAnswer, evidence: FleetEvidence, provenance: Fleet
         effects=sections.effects(answer, evidence.rows, season, labels, wheels),
         effects_not_shown=max(len(answer.effects) - sections.MOST_EFFECTS, 0),
         unexplained=sections.unexplained(answer, labels, wheels),
+        curves=sections.curves(answer, labels),
         channels=channels,
         fit=Markup("" if channels else fit_figure(answer, unit, labels)),  # noqa: S704  # texts are escaped
         confusions=of_one.confusions(answer, labels),

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import to_the_minute
 from regolithd.calibration.mismatch.inference.statements import capital, percent, plural
 from regolithd.calibration.mismatch.report import sections, tables
 from regolithd.calibration.mismatch.report.axes import number
+from regolithd.calibration.mismatch.report.empirical import band_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +41,7 @@ class FleetEffectSection:
 
 @dataclass(frozen=True)
 class UnexplainedRow:
-    """What no candidate explains in one recording."""
+    """What no candidate explains in one recording, or in several that have it in common."""
 
     rover: str
     recording: str
@@ -48,6 +49,14 @@ class UnexplainedRow:
     where: str
     when: str
     share: str
+
+
+@dataclass(frozen=True)
+class CurveSection:
+    """A curve that recordings have in common: over what and in which, and its drawing."""
+
+    title: str
+    svg: Markup
 
 
 @dataclass(frozen=True)
@@ -159,6 +168,18 @@ def unexplained(answer: FleetAnswer, labels: Labels, wheels: Sequence[int | str]
             share=percent(place.share_of_residual),
         )
         for place in answer.unexplained
+    )
+
+
+def curves(answer: FleetAnswer, labels: Labels) -> tuple[CurveSection, ...]:
+    """Return the curves that recordings have in common."""
+    return tuple(
+        CurveSection(
+            capital(f"{labels.covariate(place.covariate)}: {place.told_where}"),
+            Markup(band_figure(place.covariate, place.curve, None, labels)),  # noqa: S704  # escaped inside
+        )
+        for place in answer.unexplained
+        if place.curve is not None
     )
 
 

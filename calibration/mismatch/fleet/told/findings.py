@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +11,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.answer import FitImprovement, Parameter
 from regolithd.calibration.mismatch.fleet.choice.alternatives import other_choices
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
-from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
-from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
-from regolithd.calibration.mismatch.fleet.choice.selection import without
+from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
     FleetEffect,
@@ -23,9 +20,10 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
     RoverOfFleet,
     to_the_minute,
 )
+from regolithd.calibration.mismatch.fleet.told.curves import curve_in_common
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
-from regolithd.calibration.mismatch.fleet.told.sizes import parameters_of, size_with_std
+from regolithd.calibration.mismatch.fleet.told.sizes import parameters_of, rms, size_with_std
 from regolithd.calibration.mismatch.inference.other_answers.probability import other_answers, probability
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.prior import parted_own_name
@@ -36,86 +34,12 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from datetime import datetime
 
     from regolithd.calibration.mismatch.answer import Effect, Verdict
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
-    from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
-    from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
-    from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit, FleetTerm
-    from regolithd.calibration.mismatch.fleet.work.found import Found
-    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+    from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm
+    from regolithd.calibration.mismatch.fleet.told.chosen import Beside, Chosen
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Names:
-    """What rovers and recordings are called, in the order of the sums.
-
-    Attributes
-    ----------
-    rovers: names of the rovers, by index
-    recordings: names of the recordings
-    begins: when each began
-    """
-
-    rovers: tuple[str, ...]
-    recordings: tuple[str, ...]
-    begins: tuple[datetime | None, ...]
-
-    def date(self, recording: int) -> str | None:
-        """Return when a recording began (ISO 8601)."""
-        begins = self.begins[recording]
-        return None if begins is None else begins.isoformat().replace("+00:00", "Z")
-
-
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
-
-    equations: FleetEquations
-    fit: FleetFit
-    stds: Array
-
-    @classmethod
-    def of(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> Beside:
-        """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
-        rest = equations.beside(shown)
-        again = rest.fit(fit.terms)
-        return cls(rest, again, size_stds(rest, again))
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """The choice for one channel, and what it is told from."""
-
-    chooser: Chooser
-    fit: FleetFit
-    names: Names
-    found: tuple[Found, ...]
-    simulation: Simulation
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """What covariates are called, with their units: as the simulation states it, else as the columns are."""
-        of_columns = {name: label for found in reversed(self.found) for name, label in found.labels.items()}
-        return {**of_columns, **self.simulation.covariate_labels}
-
-    @property
-    def equations(self) -> FleetEquations:
-        """Of the fleet."""
-        return self.chooser.equations
-
-    @cached_property
-    def shown(self) -> Shown:
-        """What single recordings show beside the choice."""
-        return shown_beside(self.equations, self.fit, self.found)
-
-    @cached_property
-    def beside(self) -> Beside:
-        """The choice, fitted with what single recordings show."""
-        return Beside.of(self.equations, self.fit, self.shown.terms)
 
 
 def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
@@ -125,7 +49,8 @@ def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
     shown, beside = chosen.shown, chosen.beside
     effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.named)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
-    curves = tuple(_curve(chosen, len(fit.named) + place) for place in range(len(fit.curves)))
+    unnamed = range(len(fit.named), len(fit.terms))
+    curves = tuple(curve_in_common(chosen, index, beside, held_out) for index in unnamed)
     alone = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
     rest = (*curves, *alone)
     parameters = _parameters(chosen, beside)
@@ -133,7 +58,7 @@ def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     floor = _noise_floor(chosen)
     counts = equations.counts
-    before, after = (_rms(squares, counts) for squares in (held_out.before, held_out.after))
+    before, after = (rms(squares, counts) for squares in (held_out.before, held_out.after))
     # What single recordings show was decided by each alone, and is no choice among the names of all.
     others = None if single or alone else other_choices(chosen.chooser, fit)
     limits = replace(THRESHOLDS, highest_probability=THRESHOLDS.highest_season_probability ** (1 / channels))
@@ -160,17 +85,13 @@ def _rover(chosen: Chosen, rover: int) -> RoverOfFleet:
     )
 
 
-def _rms(squares: Array, counts: Array) -> float:
-    return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
-
-
 def _effect(chosen: Chosen, index: int, beside: Beside, held_out: HeldOutSquares) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
     where = acting & (equations.counts > 0)
     counts = equations.counts[where]
-    errors = _rms(held_out.without[index][where], counts), _rms(held_out.after[where], counts)
+    errors = rms(held_out.without[index][where], counts), rms(held_out.after[where], counts)
     wheels = tuple(equations.wheels[w] for w in term.units.wheels if where[:, w].any())
     since = term.course.kind in {"since", "growing"}
     first, last = onset_places(equations, fit, index) if since else (0, 0)
@@ -276,28 +197,6 @@ def _dates_of_recording(chosen: Chosen, recording: int) -> tuple[str | None, str
     return date(recording) if place else None, date(of_rover[place + 1]) if recording != of_rover[-1] else None
 
 
-def _curve(chosen: Chosen, index: int) -> FleetUnexplained:
-    """Return a curve that recordings have in common, and how much of what they leave it is, beyond chance."""
-    equations, fit, names = chosen.equations, chosen.fit, chosen.names
-    term = fit.terms[index]
-    acting = equations.factors(term).any(axis=0) & (equations.counts > 0)
-    date = names.date(term.course.first)
-    left, less = (equations.squares(each)[acting].sum() for each in (fit, equations.fit(without(fit, index))))
-    at = np.flatnonzero(acting.any(axis=1)).tolist()
-    return FleetUnexplained(
-        channel=chosen.simulation.channel,
-        wheels=tuple(equations.wheels[w] for w in term.units.wheels if acting[:, w].any()),
-        covariate=str(term.group.shape["over"]),
-        from_s=min(chosen.found[i].first_s for i in at),
-        to_s=max(chosen.found[i].last_s for i in at),
-        share_of_residual=float(np.clip((less - left) / max(less, 1e-300), 0.0, 1.0)),
-        rovers=tuple(names.rovers[rover] for rover in term.units.rovers),
-        recordings=tuple(names.recordings[i] for i in at),
-        since=date if term.course.kind == "since" else None,
-        until=date if term.course.kind == "until" else None,
-    )
-
-
 def owners_of(chosen: Chosen) -> list[tuple[str, ...]]:
     """Return whose the told parameters are: all rovers', or each rover's; where they are each recording's, none."""
     rovers = chosen.names.rovers
@@ -375,7 +274,8 @@ def _notes(chosen: Chosen) -> tuple[str, ...]:
             of.setdefault(note, []).append(name)
     count = len(chosen.names.recordings)
     told = tuple(f"{_which(names, count)}: {note}" for note, names in of.items())
-    return (*told, f"{IN_EACH_ALONE}: {', '.join(alone)}.") if (alone := in_each_alone(chosen)) else told
+    alone = in_each_alone(chosen)
+    return (*told, f"{IN_EACH_ALONE}: {', '.join(alone)}.") if alone else told
 
 
 NOT_CONFIRMED = (

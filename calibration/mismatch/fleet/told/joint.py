@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.regression.screening.schur import pseudo_inv
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.fleet.told.findings import Chosen
+    from regolithd.calibration.mismatch.fleet.told.chosen import Chosen
 
 
 def joint_parameters(channels: Sequence[Chosen]) -> tuple[FleetParameter, ...]:

@@ -41,6 +41,11 @@ class Law:
     spread: Array
 
 
+def rms(squares: Array, counts: Array) -> float:
+    """Return the root of the mean of squares, which are sums over so many readings."""
+    return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
+
+
 def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
     """Return an effect's `count` coefficients with standard deviations; of a size of each rover's, mean and spread."""
     values, stds = values.reshape(-1, count), stds.reshape(-1, count)

@@ -9,7 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.fleet.work.fleet_curve import FleetCurve
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
-from regolithd.calibration.mismatch.regression.groups.smooth_groups import SINES
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import EACH_WAY, SINES
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def with_curves_of(grid: Sequence[GridGroup], found: Sequence[Found]) -> tuple[G
     groups = list(grid)
     for over, coupling in kept:
         low, high = _reach(over, found)
+        low = -high if coupling == EACH_WAY else low
         shape: Shape = {"over": over, "coupling": coupling, "low": low, "high": high}
         groups.append(GridGroup(FleetCurve(), shape, tuple(range(THRESHOLDS.curve_knots)), len(kept)))
     return tuple(groups)

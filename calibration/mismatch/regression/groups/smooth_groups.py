@@ -36,6 +36,8 @@ SAME_COURSE = 0.999
 """Correlation of two covariates above which they are one quantity (a choice: a thousandth of the power differs)."""
 PERIODIC, PERIODIC_OFFSET = "drag, periodic", "offset, periodic"
 """Couplings of a sine over time, or over a covariate: along the motion, and whatever the motion."""
+EACH_WAY = "each way"
+"""Coupling of what is a function of the speed with its sign, and neither a drag nor an offset."""
 SINES = frozenset({PERIODIC, PERIODIC_OFFSET})
 """Both."""
 FEWEST_CYCLES, MOST_CYCLES = 2.5, 24.0
@@ -69,7 +71,7 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     if speed is not None and np.nanmin(speed) < 0:
         # What acts one way only is neither a drag nor an offset.
         hats = hat_functions(speed, problem.mask, problem.thresholds.curve_knots)
-        design = with_group(design, "wheel_speed", hats, "each way")
+        design = with_group(design, "wheel_speed", hats, EACH_WAY)
     coupling = "drag" if "drag" in couplings else "offset"
     hats = hat_functions(problem.covariates["time"], problem.mask, problem.thresholds.time_knots)
     return with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
@@ -78,6 +80,11 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
 def as_followed(covariate: str, values: Array) -> Array:
     """Return values of a covariate as a smooth term follows them: of a speed, how large it is."""
     return np.abs(values) if covariate == "wheel_speed" else values
+
+
+def follows_size(covariate: str, coupling: str) -> bool:
+    """Return whether a smooth term follows how large a covariate is, whatever its sign."""
+    return covariate == "wheel_speed" and coupling != EACH_WAY
 
 
 def _with_constant_share(design: DesignMatrix, prediction: Array) -> DesignMatrix:
@@ -157,7 +164,7 @@ def is_constant(term: Term) -> bool:
 def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Array]:
     """Return a covariate as its smooth term has it, and the factor by which that acts, shape (time, wheel) each."""
     values = problem.covariates[covariate]
-    if coupling == "each way":
+    if coupling == EACH_WAY:
         return values, np.ones(values.shape)
     values = as_followed(covariate, values)
     couplings = couplings_of(problem)

@@ -35,7 +35,8 @@ from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equation
 from regolithd.calibration.mismatch.fleet.choice.search import penalty, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
-from regolithd.calibration.mismatch.fleet.told.findings import NOT_CONFIRMED, Chosen, Names, answer_of_fleet
+from regolithd.calibration.mismatch.fleet.told.chosen import Chosen, Names
+from regolithd.calibration.mismatch.fleet.told.findings import NOT_CONFIRMED, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.inference.findings import Findings
 from regolithd.calibration.mismatch.problem.prior import Prior
@@ -309,6 +310,15 @@ def test_a_curve_is_told_with_its_recordings_and_their_dates() -> None:
     assert rest.told_where == "2 recordings of rover 0 since 2026-03-05 08:00"
     own, noise = KNOTS * 0.1**2, float(np.mean(DEVIATION**2))
     assert rest.share_of_residual == pytest.approx(own / (own + noise), rel=0.15)
+    assert rest.curve is not None
+    assert rest.curve.at == tuple(range(KNOTS))
+    inside = [
+        low <= 0.1 * (-1) ** knot <= high
+        for knot, low, high in zip(range(KNOTS), rest.curve.low, rest.curve.high, strict=True)
+    ]
+    assert sum(inside) >= KNOTS - 2
+    assert (rest.curve.coupling, rest.curve.unit, rest.curve.magnitude) == ("offset", "A", False)
+    assert rest.curve.helps_held_out
 
 
 def test_an_error_that_does_not_fall_is_told() -> None:
