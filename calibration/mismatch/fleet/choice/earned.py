@@ -72,11 +72,14 @@ class _Names:
         return replace(self.chooser, equations=equations), equations.fit(self.fit.terms)
 
     def margin(self, index: int) -> float:
-        """Return by how much a name is ahead of what is asked of it; minus infinity where it cannot be one."""
+        """Return by how much a name is ahead of what is asked of it; minus infinity where it cannot be one.
+
+        A curve has been held against names already, and those that single recordings show over its covariate are it.
+        """
         chooser, beside = self._beside
         if not (self._can_be_told(index) and chooser.acceptable_term(beside, index) and self._lowers_errors(index)):
             return -np.inf
-        return self._lead(index)
+        return self._lead(index) if self.fit.terms[index].group.named else np.inf
 
     def with_less(self, index: int) -> tuple[FleetTerm, ...]:
         """Return the terms without one; one with a size of each rover's own stays on those that show it beside."""

@@ -79,6 +79,12 @@ class FleetEquations:
         """The curves, which have none."""
         return tuple(group for group in self.groups if not group.named)
 
+    @cached_property
+    def implausibility(self) -> dict[int, float]:
+        """Δχ² that each group must gain for being hardly possible in one of the recordings, by its first column."""
+        most = np.max([sums.penalties for sums in self.sums], axis=0).tolist()
+        return {group.columns[0]: each for group, each in zip(self.groups, most, strict=True)}
+
     @property
     def count(self) -> int:
         """Number of recordings."""

@@ -6,6 +6,7 @@ its coefficients, and for having been chosen among shapes, rovers, wheels and da
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from math import comb
 from typing import TYPE_CHECKING
@@ -119,8 +120,7 @@ def course_cost(course: Course, thresholds: Thresholds = THRESHOLDS) -> float:
 
 
 def _implausibility(equations: FleetEquations, group: GridGroup) -> float:
-    place = equations.groups.index(group)
-    return max(float(sums.penalties[place]) for sums in equations.sums)
+    return equations.implausibility[group.columns[0]]
 
 
 def score(equations: FleetEquations, fit: FleetFit) -> float:
@@ -155,8 +155,8 @@ def further(
         ]
         of_name: dict[str, tuple[float, FleetTerm]] = {}
         for gain, term in _gains(equations, fit, left, place, allowed):
-            value = gain - penalty(equations, term)
-            if gain > 0 and (term.name not in of_name or value > of_name[term.name][0]):
+            least = of_name[term.name][0] if term.name in of_name else -np.inf
+            if gain > max(least, 0.0) and (value := gain - penalty(equations, term)) > least:  # a penalty is never < 0
                 of_name[term.name] = (value, term)
         best += of_name.values()
     return sorted(best, key=lambda pair: -pair[0])
@@ -173,7 +173,15 @@ def _gains(
             continue
         by = np.stack([course.factors(place.recordings, equations.when) for course in courses])
         costs = np.array([course_cost(course) for course in courses])
-        for group in chosen:
+        together = [len(group.columns) > 1 or group.of_wheels for group in chosen]
+        single = [group for group, several in zip(chosen, together, strict=True) if not several]
+        if single:
+            of_single = summed.gains_of_single(by, single)
+            for group, gains, top in zip(
+                single, of_single.T, np.argmax(of_single - costs[:, None], axis=0), strict=True
+            ):
+                yield float(gains[top]), FleetTerm(group, place.units, courses[top])
+        for group in itertools.compress(chosen, together):
             gains = _own_gains(equations, left, place, group, by) if group.of_wheels else summed.gains(by, group)
             top = int(np.argmax(gains - costs))
             yield float(gains[top]), FleetTerm(group, place.units, courses[top])
@@ -217,13 +225,10 @@ class Summed:
         """Return the Δχ² of a group with each course, shape (course,); `by` is (course, recording)."""
         at = list(group.columns)
         moment = by @ self.left[:, at]
-        cross = np.einsum("jic,mi->mjc", self.cross[:, :, at], by)
-        own = np.einsum("icd,mi->mcd", self.own[:, at][:, :, at], by**2)
-        complement = own - np.einsum("mjc,jl,mld->mcd", cross, self.inverse, cross, optimize=True)
+        cross = np.tensordot(by, self.cross[:, :, at], axes=(1, 1))
+        own = np.tensordot(by**2, self.own[:, at][:, :, at], axes=(1, 0))
+        complement = own - np.swapaxes(cross, 1, 2) @ (self.inverse @ cross)
         least, signs = THRESHOLDS.least_tolerance, group.signs
-        if len(at) == 1:
-            sign = np.array(signs[:1])
-            return delta_chi2_of_each(moment[:, 0], complement[:, 0, 0], own[:, 0, 0], sign, least)
         largest = np.max(np.diagonal(own, axis1=1, axis2=2), axis=1)
         return np.array(
             [
@@ -231,6 +236,16 @@ class Summed:
                 for m, c, most in zip(moment, complement, largest, strict=True)
             ]
         )
+
+    def gains_of_single(self, by: Array, groups: Sequence[GridGroup]) -> Array:
+        """Return the Δχ² of groups of one column each with each course, shape (course, group)."""
+        at = [group.columns[0] for group in groups]
+        signs = np.array([group.signs[0] for group in groups])
+        moment = by @ self.left[:, at]
+        cross = np.tensordot(by, self.cross[:, :, at], axes=(1, 1))
+        own = by**2 @ self.own[:, at, at]
+        complement = own - np.sum(cross * (self.inverse @ cross), axis=1)
+        return delta_chi2_of_each(moment, complement, own, signs, THRESHOLDS.least_tolerance)
 
 
 def summed_over(equations: FleetEquations, fit: FleetFit, left: Array, place: Place) -> Summed:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Shape
     from regolithd.calibration.mismatch.fleet.work.found import Found
 
-MOST_CURVES = 16
+MOST_CURVES = 20
 """Curves that are looked for, at most (a choice: computing time)."""
 MOST_BYTES = 192 * 2**20
 """Memory of the sums of products of all recordings that curves may make necessary (a choice)."""
@@ -48,7 +48,13 @@ def with_curves_of(grid: Sequence[GridGroup], found: Sequence[Found]) -> tuple[G
 def _wanted(found: Sequence[Found]) -> list[tuple[str, str]]:
     """Return covariates and couplings of curves: those that most recordings show first, then the usual ones."""
     shown = Counter(one for each in found for one in dict.fromkeys(_shown_in(each)))
-    usual = dict.fromkeys((name, each.usual_coupling) for each in found for name in each.ranges)
+    most = max(len(each.couplings) for each in found)
+    usual = [
+        (name, each.couplings[place])
+        for place in range(most)
+        for each in found
+        for name in (each.ranges if place < len(each.couplings) else ())
+    ]
     everything = [*(one for one, _ in shown.most_common()), *usual]
     return [one for one in dict.fromkeys(everything) if one[0] not in OF_ONE_RECORDING and _varies(one[0], found)]
 

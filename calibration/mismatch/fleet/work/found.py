@@ -99,7 +99,7 @@ class Found:
     smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where they have to be computed
     unknown: initial states of runs, by their names, that are far off
     ranges: of each covariate that a curve may be over, where its outermost knots are
-    usual_coupling: how such a curve acts, where nothing is known of it
+    couplings: how such a curve may act, where nothing is known of it, the usual first
     first_s, last_s, step_s: of the recording's instants
     lagged: sums over pairs of readings of what all that was found leaves
     """
@@ -122,7 +122,7 @@ class Found:
     smoothed: dict[str, Single] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
-    usual_coupling: str = ""
+    couplings: tuple[str, ...] = ()
     first_s: float = 0.0
     last_s: float = 0.0
     step_s: float = 0.0
@@ -169,7 +169,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         smoothed={name: values.astype(np.float32) for name, values in problem.smoothed.items()},
         unknown=tuple(sorted(problem.unknown)),
         ranges=_ranges(decision),
-        usual_coupling=_usual_coupling(decision),
+        couplings=_couplings(decision),
         first_s=float(problem.time_s[0, 0]),
         last_s=float(problem.time_s[-1, 0]),
         step_s=problem.recording.step_s,
@@ -188,12 +188,11 @@ def _ranges(decision: Decision) -> dict[str, tuple[float, float]]:
     return found
 
 
-def _usual_coupling(decision: Decision) -> str:
-    """Return how a smooth term acts: on a state, where the simulation has one that remembers; else along the motion."""
-    if memory_of(decision.equations.problem) > 0:
-        return ON_STATE
-    couplings = {group.coupling for group in decision.equations.design.groups if not group.named}
-    return "drag" if "drag" in couplings else "offset"
+def _couplings(decision: Decision) -> tuple[str, ...]:
+    """Return how a smooth term may act: on a state that remembers, along the motion, or on the reading."""
+    of_terms = {group.coupling for group in decision.equations.design.groups if not group.named}
+    on_state = (ON_STATE,) if memory_of(decision.equations.problem) > 0 else ()
+    return (*on_state, *(each for each in ("drag", "offset") if each in of_terms))
 
 
 def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str, Responses]:

@@ -22,7 +22,7 @@ RANGES = {"load": (40.0, 60.0), "time": (0.0, 60.0), "wheel_speed": (0.0, 0.3), 
 
 def found(*terms: FoundTerm, ranges: dict[str, tuple[float, float]] = RANGES, usual: str = "drag") -> Found:
     """Return what a recording shows."""
-    return Found(FINDINGS, {}, DEVIATION, 1.0, 0.1, 8.0, terms, {}, ranges=ranges, usual_coupling=usual)
+    return Found(FINDINGS, {}, DEVIATION, 1.0, 0.1, 8.0, terms, {}, ranges=ranges, couplings=(usual,))
 
 
 def curve(name: str, coupling: str, *, named: bool = False) -> FoundTerm:
@@ -91,7 +91,7 @@ def test_a_curve_on_a_state_is_seen_through_it() -> None:
 def test_a_recording_says_over_what_a_curve_may_be_and_how_it_would_act() -> None:
     """On the state, where the simulation has one."""
     shown = found_in(recorded(1), Room(), Room.channel)
-    assert shown.usual_coupling == ON_STATE
+    assert shown.couplings == (ON_STATE, "offset")
     low, high = shown.ranges["wind"]
     assert 0 <= low < high
     assert shown.step_s == 60.0
