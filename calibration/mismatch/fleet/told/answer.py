@@ -11,6 +11,10 @@ from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.inference.statements import listed
 
 
+FEW = 3
+"""Recordings that are told by their names, at most (a choice: a line)."""
+
+
 def to_the_minute(date: str) -> str:
     """Return a date and time of the answer (ISO 8601) as a sentence has it: 2026-05-10 00:00."""
     return date[:16].replace("T", " ")
@@ -53,14 +57,15 @@ class FleetUnexplained(Unexplained):
 
     @property
     def told_where(self) -> str:
-        """The recording, or how many there are since when; and the rovers where these have names."""
+        """The recordings, or how many there are, and since when; and the rovers where these have names."""
         of = f" of {listed(self.rovers)}" if self.rovers != (ONLY_ROVER,) else ""
         if len(self.recordings) == 1:
             return f"{self.recordings[0]}{of}"
         when = "".join(
             f" {word} {to_the_minute(date)}" for word, date in (("since", self.since), ("until", self.until)) if date
         )
-        return f"{len(self.recordings)} recordings{of}{when}"
+        few = len(self.recordings) <= FEW
+        return f"{listed(self.recordings) if few else f'{len(self.recordings)} recordings'}{of}{when}"
 
 
 @dataclass(frozen=True)

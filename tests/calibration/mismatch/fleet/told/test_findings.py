@@ -307,7 +307,7 @@ def test_a_curve_is_told_with_its_recordings_and_their_dates() -> None:
     assert (answer.verdict, answer.effects) == ("unexplained", ())
     assert (rest.covariate, rest.rovers, rest.recordings) == ("load", ("rover 0",), ("drive 4", "drive 6"))
     assert (rest.since, rest.until, rest.to_s) == ("2026-03-05T08:00:00Z", None, 6.0)
-    assert rest.told_where == "2 recordings of rover 0 since 2026-03-05 08:00"
+    assert rest.told_where == "drive 4 and drive 6 of rover 0 since 2026-03-05 08:00"
     own, noise = KNOTS * 0.1**2, float(np.mean(DEVIATION**2))
     assert rest.share_of_residual == pytest.approx(own / (own + noise), rel=0.15)
     assert rest.curve is not None
