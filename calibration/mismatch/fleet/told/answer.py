@@ -10,7 +10,6 @@ from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, E
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.inference.statements import listed
 
-
 FEW = 3
 """Recordings that are told by their names, at most (a choice: a line)."""
 
