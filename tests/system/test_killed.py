@@ -12,7 +12,7 @@ import pytest
 from regolithd.daemon.recording.candump import read_log
 from regolithd.daemon.recording.content import SNAPSHOT
 from regolithd.daemon.recording.mcap_file import read_messages
-from regolithd.daemon.recording.replay import replay_logs
+from regolithd.daemon.recording.replay import ReplayError, replay_logs
 from regolithd.daemon.setup import models_or_exit, recorded_configuration
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,6 +53,11 @@ def test_a_killed_daemon_leaves_a_recording_that_lacks_at_most_the_last_second(t
         frames = list(read_log(log))
         assert time_ns - frames[-1].time_ns <= SECOND_NS if frames else sequence < RATE_HZ
         configuration = recorded_configuration(mcap)
+        if not frames:  # killed before anything was flushed: there is nothing to replay, and it says so
+            with pytest.raises(ReplayError, match="it is empty"):
+                replay_logs([log], configuration, models_or_exit(configuration))
+            assert not snapshots
+            continue
         replayed = replay_logs([log], configuration, models_or_exit(configuration))
         assert replayed.compared > 0 or not snapshots
         # The log may end before the MCAP file does: both are flushed, one after the other.
