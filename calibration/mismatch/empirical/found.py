@@ -120,16 +120,36 @@ def _rms(sums: CovariateSums, squares: Array) -> float:
 
 
 def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, float]) -> EmpiricalCurve:
-    coupling, reach = term.group.coupling, NINETY_PERCENT_STDS * spline.std
+    units = problem.simulation.unit, unit_in_label(term.name, problem.labels)
+    return with_band(term.name, term.group.coupling, units, (spline.at, spline.value, spline.std), held_out)
+
+
+def with_band(
+    covariate: str,
+    coupling: str,
+    units: tuple[str, str],
+    knots: tuple[Array, Array, Array],
+    held_out: tuple[float, float],
+) -> EmpiricalCurve:
+    """Return a curve with its 90 % band.
+
+    Parameters
+    ----------
+    units: of the channel, and of the covariate
+    knots: where they are, values there and their standard deviations, shape (knot,) each
+    held_out: errors without and with the curve
+    """
+    at, value, std = knots
+    reach = NINETY_PERCENT_STDS * std
     return EmpiricalCurve(
         coupling=coupling,
-        magnitude=follows_size(term.name, coupling),
-        unit="1" if coupling == "gain" else problem.simulation.unit,
-        covariate_unit=unit_in_label(term.name, problem.labels),
-        at=tuple(spline.at.tolist()),
-        value=tuple(spline.value.tolist()),
-        low=tuple((spline.value - reach).tolist()),
-        high=tuple((spline.value + reach).tolist()),
+        magnitude=follows_size(covariate, coupling),
+        unit="1" if coupling == "gain" else units[0],
+        covariate_unit=units[1],
+        at=tuple(at.tolist()),
+        value=tuple(value.tolist()),
+        low=tuple((value - reach).tolist()),
+        high=tuple((value + reach).tolist()),
         held_out_rmse_before=held_out[0],
         held_out_rmse_after=held_out[1],
     )

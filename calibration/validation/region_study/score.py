@@ -9,6 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.problem.covariates import names_of_prediction
+from regolithd.calibration.mismatch.regression.groups.smooth_groups import as_followed
 from regolithd.calibration.validation.lisdd import lisdd
 from regolithd.calibration.validation.region_study.machines import Array, Case, Mask, Stated
 
@@ -95,8 +96,7 @@ def _values(case: Case, covariate: str) -> Array:
         return case.recorded["t_s"]
     if covariate in names_of_prediction(case.machine.channel):
         return np.abs(Stated(case.machine).predict(case.recorded, case.true))
-    values = case.recorded[case.machine.covariates[covariate]]
-    return np.abs(values) if covariate == "wheel_speed" else values
+    return as_followed(covariate, case.recorded[case.machine.covariates[covariate]])
 
 
 def _score(method: str, case: Case, failing: Mask, parameters: Array, held: tuple[int, int] = (0, 0)) -> Score:

@@ -16,7 +16,11 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course, courses_over
 from regolithd.calibration.mismatch.fleet.choice.terms import FleetTerm, Units
-from regolithd.calibration.mismatch.regression.screening.schur import delta_chi2_of_each, delta_chi2_together
+from regolithd.calibration.mismatch.regression.screening.schur import (
+    delta_chi2_of_each,
+    delta_chi2_together,
+    schur_diagonal,
+)
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -242,9 +246,9 @@ class Summed:
         at = [group.columns[0] for group in groups]
         signs = np.array([group.signs[0] for group in groups])
         moment = by @ self.left[:, at]
-        cross = np.tensordot(by, self.cross[:, :, at], axes=(1, 1))
+        cross = np.asarray(np.tensordot(by, self.cross[:, :, at], axes=(1, 1)), np.float64)
         own = by**2 @ self.own[:, at, at]
-        complement = own - np.sum(cross * (self.inverse @ cross), axis=1)
+        complement = schur_diagonal(own, cross, self.inverse)
         return delta_chi2_of_each(moment, complement, own, signs, THRESHOLDS.least_tolerance)
 
 

@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.empirical.found import with_band
 from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.fleet.told.answer import FleetUnexplained
 from regolithd.calibration.mismatch.fleet.told.sizes import rms, told_sizes
-from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import unit_in_label
-from regolithd.calibration.mismatch.regression.groups.smooth_groups import follows_size
 from regolithd.calibration.mismatch.regression.groups.state_groups import ON_STATE
-from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares
     from regolithd.calibration.mismatch.fleet.told.chosen import Beside, Chosen
+    from regolithd.calibration.mismatch.problem.corrections.empirical_curve import EmpiricalCurve
 
 
 def curve_in_common(chosen: Chosen, index: int, beside: Beside, held_out: HeldOutSquares) -> FleetUnexplained:
@@ -55,18 +54,7 @@ def _empirical(chosen: Chosen, index: int, beside: Beside, errors: tuple[float, 
     known = np.flatnonzero(std > 0)
     if coupling == ON_STATE or not known.size:
         return None
-    reached, reach = slice(known[0], known[-1] + 1), NINETY_PERCENT_STDS * std
-    knots = np.linspace(float(term.group.shape["low"]), float(term.group.shape["high"]), len(value))
-    at, value, low, high = (each[reached].tolist() for each in (knots, value, value - reach, value + reach))
-    return EmpiricalCurve(
-        coupling=coupling,
-        magnitude=follows_size(over, coupling),
-        unit="1" if coupling == "gain" else chosen.simulation.unit,
-        covariate_unit=unit_in_label(over, chosen.labels),
-        at=tuple(at),
-        value=tuple(value),
-        low=tuple(low),
-        high=tuple(high),
-        held_out_rmse_before=errors[0],
-        held_out_rmse_after=errors[1],
-    )
+    reached = slice(known[0], known[-1] + 1)
+    at = np.linspace(float(term.group.shape["low"]), float(term.group.shape["high"]), len(value))
+    units = chosen.simulation.unit, unit_in_label(over, chosen.labels)
+    return with_band(over, coupling, units, (at[reached], value[reached], std[reached]), errors)

@@ -189,8 +189,9 @@ class Sums:
         self._make_room_for_rows(later)
         unknown = ~self._known[self._row[later - self._square.shape[-1]][:, None], columns]
         rows, others = later[unknown.any(axis=1)], np.unique(columns[unknown.any(axis=0)])
-        for first in range(0, len(rows), self._columns.at_once * ROWS_AT_ONCE):
-            part = rows[first : first + self._columns.at_once * ROWS_AT_ONCE]
+        at_once = self._columns.at_once * ROWS_AT_ONCE
+        for first in range(0, len(rows), at_once):
+            part = rows[first : first + at_once]
             self._keep(part, others, self._of(self._columns.read(part), others))
 
     def _of(self, rows: Single, columns: Index) -> Single:

@@ -58,8 +58,8 @@ def held_by_last(matrix: Array, first: int, last: int, size: Array, singular: fl
 
 
 def schur_diagonal(own_diagonal: Array, cross: Array, inverse: Array) -> Array:
-    """Return the diagonal of the Schur complement alone, shape (new,): for many columns, each by itself."""
-    return own_diagonal - np.einsum("sp,sp->p", cross, inverse @ cross)
+    """Return the diagonal of the Schur complement alone, shape (…, new): for many columns, each by itself."""
+    return np.asarray(own_diagonal - np.einsum("...sp,...sp->...p", cross, inverse @ cross))
 
 
 def delta_chi2_of_each(
