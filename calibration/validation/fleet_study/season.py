@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.validation.blind_trials.recordings.concealed_effect import ConcealedEffect, of_strength
+from regolithd.calibration.validation.blind_trials.recordings.concealed_effect import (
+    ConcealedEffect,
+    TrueModel,
+    of_strength,
+    on_wheels,
+    relative_strength,
+)
 from regolithd.calibration.validation.blind_trials.recordings.files import recording_text, toml_text
 from regolithd.calibration.validation.blind_trials.recordings.generator import (
     Plan,
@@ -24,13 +30,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from regolithd.calibration.validation.blind_trials.recordings.concealed_effect import TrueModel
+    from numpy.random import Generator
+
     from regolithd.calibration.validation.blind_trials.recordings.generator import Tables, Trial
 
 START = datetime(2026, 1, 5, 9, 0, tzinfo=UTC)
 DAYS = 200.0
 """Length of the season."""
 STEP_S = 0.2
+Pair = tuple[TrueModel, TrueModel]
 
 
 @dataclass(frozen=True)
@@ -44,7 +52,7 @@ class Concealed:
     wheels: that have it
     since: share of the season after which it begins; 0: from the start
     grows: whether it grows to its full size until the end of the season, or is there at once
-    strength: root mean square where it acts, over the mean current
+    strength: root mean square where it acts on a typical drive, over the mean current there
     """
 
     name: str
@@ -113,27 +121,37 @@ def season_tables(seed: int) -> Tables:
 def trial_of(seed: int, number: int, drive: Drive, duration_s: float) -> Trial:
     """Return one drive as measured. A rover keeps its parameters and its effect's law; way and noise are new."""
     tables, place = season_tables(seed), list(ROVERS).index(drive.rover)
-    rng = np.random.default_rng([seed, 2, number])
-    traverse = rover_traverse(rng, "patrol", tables, duration_s, STEP_S)
-    model = true_model(np.random.default_rng([seed, 1, place]), tables, traverse)
-    concealed = ROVERS[drive.rover]
-    effects = () if concealed is None or drive.size == 0 else (_effect(seed, place, concealed, model, drive.size),)
+
+    def on_a_way(rng: Generator) -> TrueModel:
+        traverse = rover_traverse(rng, "patrol", tables, duration_s, STEP_S)
+        return true_model(np.random.default_rng([seed, 1, place]), tables, traverse)
+
+    rng, concealed = np.random.default_rng([seed, 2, number]), ROVERS[drive.rover]
+    model, effects = on_a_way(rng), tuple[ConcealedEffect, ...]()
+    if concealed is not None and drive.size:
+        typical = on_a_way(np.random.default_rng([seed, 4, place]))
+        effects = (_effect(seed, place, concealed, (typical, model), drive.size),)
     return with_noise(rng, Plan(number, seed, "fleet", ()), model, tables, effects)
 
 
-def _effect(seed: int, place: int, concealed: Concealed, model: TrueModel, size: float) -> ConcealedEffect:
-    """Return the effect at its size on this drive, on its wheels alone."""
+def _effect(seed: int, place: int, concealed: Concealed, models: Pair, size: float) -> ConcealedEffect:
+    """Return the effect at its size on a drive, on its wheels alone.
+
+    Its full size has the stated strength on a typical drive of the rover, the first of the two models, and is the same
+    on all others: a coefficient does not depend on how cold a day is.
+    """
+    typical, there = (_law(seed, place, concealed, model) for model in models)
+    full = of_strength(models[0], typical, concealed.strength * (len(concealed.wheels) / 6) ** 0.5).size
+    return replace(there, size=size * full, strength=relative_strength(models[1], there, size * full))
+
+
+def _law(seed: int, place: int, concealed: Concealed, model: TrueModel) -> ConcealedEffect:
+    """Return a rover's law on a drive, of no size yet."""
     law = LIBRARY_EFFECTS[concealed.law](np.random.default_rng([seed, 3, place]), model)
-    on = np.array([float(wheel in concealed.wheels) for wheel in ALL])
-    alone = (
-        replace(law, added_current_A=lambda at: at * model.traverse.rotation * on)
-        if len(concealed.wheels) == 1
-        else law
-    )
-    full = of_strength(
-        model, replace(alone, wheels=concealed.wheels), concealed.strength * (len(concealed.wheels) / 6) ** 0.5
-    )
-    return replace(full, size=size * full.size)
+    if len(concealed.wheels) == 1:
+        on = on_wheels(concealed.wheels)
+        law = replace(law, added_current_A=lambda at: at * model.traverse.rotation * on)
+    return replace(law, wheels=concealed.wheels)
 
 
 def write_season(folder: Path, seed: int, per_rover: int, duration_s: float) -> Iterator[Path]:
