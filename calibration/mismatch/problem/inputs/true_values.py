@@ -14,8 +14,7 @@ from regolithd.calibration.mismatch.signal.truths.jump_chain import JumpChain, W
 from regolithd.calibration.mismatch.signal.truths.mixing_density import MixingDensity, mixing_density
 from regolithd.calibration.mismatch.signal.truths.smoothing_spline import best_spline, differences, fitted_rows
 from regolithd.calibration.mismatch.signal.truths.stein import (
-    BATCH,
-    FEWEST_BATCHES,
+    FEWEST_READINGS,
     Estimate,
     best_combination,
     clearly_better,
@@ -149,7 +148,7 @@ def filtered_where_better(column: NoisyColumn, before: NormalTruth) -> NormalTru
         return before
     there = found.applied(centred[rows], pieces, variance)
     told = known[rows] & np.isfinite(there.mean)
-    if told.sum() < BATCH * FEWEST_BATCHES:
+    if told.sum() < FEWEST_READINGS:
         return before
     new = _at(there, told)
     old = _at(Estimate((before.mean - before.prior_mean)[rows], before.variance[rows]), told)
@@ -219,7 +218,7 @@ def _matters(deviation: float, known: NDArray[np.bool_], normal: NormalTruth) ->
     """Return whether an error is one of which more is asked, and the readings are enough for it."""
     variance = deviation**2
     told_apart = LEAST_VARIANCE * variance < normal.prior_variance < variance / LEAST_ERROR**2
-    return bool(told_apart and known.sum() >= BATCH * FEWEST_BATCHES)
+    return bool(told_apart and known.sum() >= FEWEST_READINGS)
 
 
 def refined_by_density(readings: Array, deviation: float, starts: NDArray[np.int64], normal: NormalTruth) -> Array:

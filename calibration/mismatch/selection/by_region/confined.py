@@ -169,7 +169,10 @@ def _covariates(decision: Decision, term: Term) -> list[tuple[str, str]]:
 def _in_ranges(
     equations: NormalEquations, rest: Fit, named: Term, covariates: Sequence[tuple[str, str]]
 ) -> Iterator[Confined]:
-    """Yield the best range of each covariate for each law in the place of a named one."""
+    """Yield the best range of each covariate for each law in the place of a named one.
+
+    A law that is taken to hold everywhere has another shape than in the range in which it holds: each of them is tried.
+    """
     if not covariates:
         return
     others = [
@@ -177,7 +180,9 @@ def _in_ranges(
         for _, term in best_of_each_candidate(equations, rest.terms)
         if term.wheels == named.wheels and term.name != named.name and _may_be_confined(term)
     ]
-    laws = [law for law in (named, *others[:LAWS_TRIED]) if len(law.group.columns) == 1]
+    groups = (group for group in equations.design.groups if group.named and group.name == named.name)
+    laws = [*(Term(group, named.wheels) for group in groups), *others[:LAWS_TRIED]]
+    laws = [law for law in laws if len(law.group.columns) == 1]
     design, read = equations.design, as_read(equations, rest)
     columns = [design.in_time(design.columns_as_read(law.group.columns)[0].astype(np.float64)) for law in laws]
     for covariate, coupling in covariates:

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-BATCH = 50
-"""Readings whose mean is one independent value, where the chance of a difference is judged (a choice)."""
+BATCH, SHORTEST_BATCH = 50, 25
+"""Readings whose mean is one independent value, where the chance of a difference is judged, and as few as these where
+a recording has no more (a choice)."""
 DEVIATIONS = 2.5
 """Standard deviations from which a difference is none of chance (a choice: 1 in 160 of equal ones)."""
 GREATEST_SURPLUS = 0.25
@@ -39,6 +40,7 @@ MOST_LEFT = 3.0
 choice: noise that is half as large again as stated leaves 2.25, a step of two errors that is smoothed away 4)."""
 FEWEST_BATCHES = 4
 """Batches below which nothing is judged."""
+FEWEST_READINGS = FEWEST_BATCHES * SHORTEST_BATCH
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +83,13 @@ def consistent(readings: Array, error_variance: float, estimate: Estimate) -> bo
 
 def consistent_throughout(readings: Array, error_variance: float, mean: Array) -> bool:
     """Return whether readings differ by no more in any batch: models are fitted to parts of a recording alone."""
-    left = (readings - mean) ** 2
-    batches = left[: len(left) // BATCH * BATCH].reshape(-1, BATCH).mean(axis=1)
-    return bool(np.all(batches <= MOST_LEFT * error_variance))
+    return bool(np.all(_batch_means((readings - mean) ** 2) <= MOST_LEFT * error_variance))
+
+
+def _batch_means(values: Array) -> Array:
+    """Return the means of batches of values (time,), shape (batch,); of values at the end that fill none, nothing."""
+    length = int(np.clip(len(values) // FEWEST_BATCHES, SHORTEST_BATCH, BATCH))
+    return values[: len(values) // length * length].reshape(-1, length).mean(axis=1)
 
 
 def best_combination(readings: Array, estimates: Sequence[Estimate]) -> Combination:
@@ -122,7 +128,7 @@ def clearly_better(
     """
     before = squared_error(readings, error_variance, old)
     gain = before - squared_error(readings, error_variance, new)
-    batches = gain[: len(gain) // BATCH * BATCH].reshape(-1, BATCH).mean(axis=1)
+    batches = _batch_means(gain)
     if len(batches) < FEWEST_BATCHES:
         return False
     chance = float(batches.std(ddof=1)) / np.sqrt(len(batches))
