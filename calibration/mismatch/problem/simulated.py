@@ -169,7 +169,13 @@ def inputs_of(
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
     expected = expected.with_notes(*notes_on_errors(shown, simulation.sensors, as_read, simulation.channel))
-    in_units = notes_on_units(recording, simulation, lambda other: predict(_prepared(other, simulation)[0]), predicted)
+    in_units = notes_on_units(
+        recording,
+        simulation,
+        lambda other: predict(_prepared(other, simulation)[0]),
+        predicted,
+        lambda name, value: simulation.predict(complete_inputs(as_read), {**values, name: value}),
+    )
     expected = expected.with_notes(*in_units)
     carries = _carries_over_gaps(as_read, simulation, values, predicted)
     in_gaps = inputs_otherwise_in_gaps(expected, simulation.inputs) if carries else None

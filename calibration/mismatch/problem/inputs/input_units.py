@@ -63,6 +63,11 @@ LEFT_SHRUNK = 0.5
 input should not do at all, a smaller unit takes away as well."""
 LEFT_PREDICTED = 0.1
 """The same of the predicted column, over its variance (a choice: converted, the simulation explains it well)."""
+FURTHEST_STDS = 3.0
+"""Standard deviations of their priors within which parameters may be the reason instead (a choice)."""
+LEFT_BY_PARAMETERS = 2.0
+"""What they then leave, over what the conversion leaves, up to which they are (a choice: the simulation is taken as
+linear in them, and it may leave out other things)."""
 BEYOND_ALL = 1e100
 """What no prediction reaches, in any unit."""
 LEAST = 1e-300
@@ -78,13 +83,16 @@ def notes_on_units(
     simulation: Predictor,
     predict: Callable[[Recording], Array],
     predicted: Callable[[], Array],
+    moved: Callable[[str, float], Array],
 ) -> Iterator[str]:
     """Yield a note on the column that is likely in another unit, or on the two that are swapped.
 
     Of several mistakes that is told with which the simulation leaves least. Swaps are tried where a unit seems to be
-    wrong, or the simulation is worse than the mean of what it predicts.
+    wrong, or the simulation is worse than the mean of what it predicts. Where parameters within their priors explain as
+    much, nothing is told.
 
-    `predict` runs the simulation as it is stated; `predicted` returns what it predicts from the readings as they are.
+    `predict` runs the simulation as it is stated; `predicted` returns what it predicts from the readings as they are,
+    and `moved` the same with another value of a parameter.
 
     Raises
     ------
@@ -117,6 +125,11 @@ def notes_on_units(
     if not found:
         return
     left, mistake, cure = min(found)
+    if (
+        _left_beside_parameters(measured - predicted(), simulation, predicted, moved)
+        <= LEFT_BY_PARAMETERS * left * variance
+    ):
+        return
     told = (
         f"{mistake}: with that put right, the simulation leaves {_in_words(left / share)} of the mean square that it "
         f"leaves of {channel} now. {cure}; another column with wrong values may look like that, too"
@@ -124,6 +137,25 @@ def notes_on_units(
     if useless:
         raise RecordingError(told)
     yield f"{told}."
+
+
+def _left_beside_parameters(
+    left: Array, simulation: Predictor, predicted: Callable[[], Array], moved: Callable[[str, float], Array]
+) -> float:
+    """Return the mean square that least squares over the parameters leaves; infinite where one is far from its prior.
+
+    The simulation is linearised at the priors' values, a standard deviation wide.
+    """
+    priors = simulation.parameters
+    steps = [moved(name, prior.value + prior.std) - predicted() for name, prior in priors.items()]
+    known = np.isfinite(left) & np.all([np.isfinite(step) for step in steps], axis=0)
+    if not steps or not known.any():
+        return float("inf")
+    columns = np.stack([step[known] for step in steps], axis=1)
+    changed = np.linalg.lstsq(columns, left[known], rcond=1e-6)[0]
+    if np.max(np.abs(changed)) > FURTHEST_STDS:
+        return float("inf")
+    return float(np.mean((left[known] - columns @ changed) ** 2))
 
 
 def _in_words(share: float) -> str:

@@ -185,3 +185,32 @@ def test_a_flow_in_another_unit_is_told() -> None:
     right = pumped()
     with pytest.raises(RecordingError, match="flow_m3_h is likely in l/min"):
         build_problem(from_columns({**right, "flow_m3_h": right["flow_m3_h"] / 0.06}), Pumping())
+
+
+class Heated(Climbing):
+    """A temperature above that of the room."""
+
+    channel, unit = "motor_K", "K"
+    parameters: ClassVar = {"rise_K": Prior(30.0, 10.0, "K")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the room's temperature and what the motor and the ramp heat."""
+        return inputs["room_degC"] + 273.15 + values["rise_K"] + 20 * inputs["ramp_rad"]
+
+
+class HeatedAsKnown(Heated):
+    """The same with a rise that is known well."""
+
+    parameters: ClassVar = {"rise_K": Prior(30.0, 3.0, "K")}
+
+
+def test_a_parameter_within_its_prior_is_no_other_unit() -> None:
+    """A room in degrees Fahrenheit is 27 K colder at 20 than in degrees Celsius: so is a motor that rises by 3 K."""
+    rise, room = 10 / 3, 20 + 0.5 * np.sin(np.arange(ROWS) / 200)
+    current = room + 273.15 + rise + 20 * RAMP_RAD + np.random.default_rng(5).normal(0, 0.05, ROWS)
+    table = from_columns(
+        {"t_s": np.arange(ROWS) * 0.1, "motor_K": current, "ramp_rad": RAMP_RAD, "room_degC": room},
+    )
+    assert build_problem(table, Heated()).recording.notes == ()
+    with pytest.raises(RecordingError, match="room_degC is likely in °F"):
+        build_problem(table, HeatedAsKnown())

@@ -118,12 +118,24 @@ def test_an_error_that_is_stated_wrongly_makes_it_no_worse(stated: float) -> Non
 
 
 def test_few_readings_and_constant_ones_stay_with_the_autoregression() -> None:
-    """Densities need some hundred readings, and an error."""
-    for count, error in ((150, 0.2), (COUNT, 0.0)):
+    """Densities need a hundred readings, and an error."""
+    for count, error in ((99, 0.2), (COUNT, 0.0)):
         normal, found = refined(ramps_and_dwells(count), error)
         assert found is normal
     constant = normal_truths(np.full((COUNT, 1), 2.0), np.array([0.01]), START).column(0)
     np.testing.assert_allclose(refined_by_density(np.full(COUNT, 2.0), 0.1, START, constant), 2.0)
+
+
+def test_a_short_recording_of_a_load_of_three_levels_is_told_by_them() -> None:
+    """Of 120 to 180 readings: what an autoregression leaves of levels would look like a curve over the load."""
+    before, after = [], []
+    for first in range(0, COUNT - 300, 300):
+        for count in (120, 150, 180):
+            truth = levels()[first : first + count]
+            normal, found = refined(truth, 0.3)
+            before.append(np.mean((normal - truth) ** 2))
+            after.append(np.mean((found - truth) ** 2))
+    assert np.mean(after) < 0.5 * np.mean(before)
 
 
 def test_far_offsets_and_outliers_change_nothing() -> None:
