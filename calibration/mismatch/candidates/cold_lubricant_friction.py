@@ -27,6 +27,9 @@ POWERS = (0.0, 1.0)
 """Power of the speed: from dry contact, or a grease that thins with shear (power-law index 0.1 to 0.5), to an oil."""
 POLES_DEGC = (-125.0, -95.0)
 """Pole temperatures of Vogel's law that bracket low-temperature greases [°C] (data sheets)."""
+BELOW_COLDEST_K = 15.0
+"""How far below the coldest reading a pole that a recording asks for is at least [K] (a choice: an oil is solid some 20
+to 60 K above its pole). Poles colder than all others differ little from the coldest of them."""
 SCALES_K = (6.0, 11.0, 20.0, 45.0)
 """Temperature changes for a factor e near the coldest reading, as searched [K] (a choice: in steps of about two)."""
 STEEPEST_K = 5.0
@@ -72,6 +75,7 @@ class ColdLubricantFriction(Candidate):
         **REVERSAL_KEYS,
     }
     free: ClassVar = {"power": POWERS, "scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
+    refined: ClassVar = {"pole_degC": (min(POLES_DEGC), 0.0)}
 
     def form_of(self, shape: Shape) -> str:
         """Return how the drag depends on temperature."""
@@ -137,6 +141,16 @@ class ColdLubricantFriction(Candidate):
         ends = (soonest, max(float(np.nanmax(temperature)), soonest) + FURTHEST_END_K)
         falls = {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
         return {"power": POWERS, **falls} if "wheel_speed" in problem.covariates else falls
+
+    def refinable(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Return the range of the pole, of Vogel's law."""
+        warmest = max(_coldest(problem) - BELOW_COLDEST_K, *POLES_DEGC)
+        return {"pole_degC": (min(POLES_DEGC), warmest)} if "scale_K" in shape else {}
+
+    def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
+        """Return what the answer reports: the pole where the recording asked for another one than usual."""
+        found = super().parameters(shape, values)
+        return {name: value for name, value in found.items() if name != "pole_degC" or value not in POLES_DEGC}
 
     def search_range(
         self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]

@@ -56,9 +56,8 @@ def answer_of_fleet(chosen: Chosen, channels: int = 1) -> FleetAnswer:
     parameters = _parameters(chosen, beside)
     named = effects or single or any(each.beyond_prior() for each in parameters)
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
-    floor = _noise_floor(chosen)
-    counts = equations.counts
-    before, after = (rms(squares, counts) for squares in (held_out.before, held_out.after))
+    before, after = (rms(squares, equations.counts) for squares in (held_out.before, held_out.after))
+    floor = _noise_floor(chosen, after)
     # What single recordings show was decided by each alone, and is no choice among the names of all.
     others = None if single or alone else other_choices(chosen.chooser, fit)
     limits = replace(THRESHOLDS, highest_probability=THRESHOLDS.highest_season_probability ** (1 / channels))
@@ -247,12 +246,14 @@ def _own_values(
     return told
 
 
-def _noise_floor(chosen: Chosen) -> float:
-    squares = sum(
-        found.noise_floor**2 * float(sums.counts.sum())
-        for found, sums in zip(chosen.found, chosen.equations.sums, strict=True)
-    )
-    return float(np.sqrt(squares / max(float(chosen.equations.counts.sum()), 1.0)))
+def _noise_floor(chosen: Chosen, held_out: float) -> float:
+    """Return the root mean square of what all that was found leaves, in each recording alone.
+
+    In all together where that is more than recordings leave that did not fit what was found: none alone may show it.
+    """
+    counts = chosen.equations.counts
+    alone = rms(np.array([found.noise_floor for found in chosen.found]) ** 2 * counts.sum(axis=1), counts)
+    return alone if alone <= held_out else rms(chosen.equations.squares(chosen.fit), counts)
 
 
 def _left_out(chosen: Chosen) -> tuple[LeftOut, ...]:

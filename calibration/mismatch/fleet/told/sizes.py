@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 SLOPE_STEP = 1e-4
 """Step of a coefficient for the slope of the size, as a share of the largest (double precision)."""
+LEAST_WEIGHT = 1e-300
+"""Weight of what nothing tells: where it is all that there is, its mean is still one."""
 ANY = (-np.inf, np.inf)
 """Bounds of what may have any value."""
 
@@ -47,9 +49,12 @@ def rms(squares: Array, counts: Array) -> float:
 
 
 def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
-    """Return an effect's `count` coefficients with standard deviations; of a size of each rover's, mean and spread."""
+    """Return an effect's `count` coefficients with standard deviations; of a size of each rover's, mean and spread.
+
+    A coefficient that nothing tells has a standard deviation of 0, and no weight.
+    """
     values, stds = values.reshape(-1, count), stds.reshape(-1, count)
-    weights = 1 / np.maximum(stds, 1e-300) ** 2
+    weights = np.divide(1.0, stds**2, out=np.full(stds.shape, LEAST_WEIGHT), where=stds > 0)
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
     return mean, _as_a_whole(mean, np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0)))
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+from lifting_axis import LiftingAxis, drive
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import from_columns
@@ -76,3 +77,21 @@ def test_a_grease_is_one_effect_whatever_its_power(power: float) -> None:
 def test_drag_that_does_not_depend_on_temperature_is_not_cold(power: float) -> None:
     """A power that no other law has does not earn the name."""
     assert "cold-lubricant-friction" not in {effect.name for effect in effects_of(power, scale_K=1e6)}
+
+
+@pytest.mark.parametrize(("seed", "pole_degC", "scale_K"), [(2, -30.0, 8.0), (3, -110.0, 15.0), (3, -30.0, 8.0)])
+def test_a_lubricant_of_another_pole_is_one_effect(seed: int, pole_degC: float, scale_K: float) -> None:  # noqa: N803
+    """Where the pole was one of two, what it missed was named: coulomb or viscous friction of 2 to 3 %."""
+
+    def vogel(columns: dict[str, Array]) -> Array:
+        above, coldest_above = columns["oil_degC"] - pole_degC, 4.0 - pole_degC
+        return 0.5 * np.sign(columns["speed_rad_s"]) * np.exp(coldest_above / scale_K * (coldest_above / above - 1))
+
+    answer = compare(drive(seed, vogel, noise=0.03), LiftingAxis()).answer
+    (effect,) = answer.effects
+    assert effect.name == "cold-lubricant-friction"
+    assert answer.unexplained == ()
+    pole = effect.parameters["pole_degC"]
+    assert pole.low is not None
+    assert pole.high is not None
+    assert pole.low <= pole_degC <= pole.high
