@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.regression.residuals import active_size
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.search import Place
@@ -76,7 +76,8 @@ class Chooser:
                 break
             fit = self.searched_anew(best, places)
         # A law by itself would be exchanged for the best one, with which another search begins.
-        return self._that_gain_enough(self.searched_anew(fit, places) if fit is start else fit)
+        searched = self.searched_anew(fit, places) if fit is start else fit
+        return self._that_gain_enough(self._merged(searched))
 
     def _that_gain_enough(self, fit: FleetFit) -> FleetFit:
         """Return the fit without effects that gain too little beside those that were chosen after them."""
@@ -144,6 +145,27 @@ class Chooser:
             shown = self.equations.on_rovers(each, rovers)
             found += [shown, replace(shown, units=replace(shown.units, each=False))]
         return found
+
+    def _merged(self, fit: FleetFit) -> FleetFit:
+        """Return the fit with one term in the place of two of one law on different rovers where that scores more.
+
+        Sets of a few rovers are not searched, and of a rover's single recording no other confirms an effect of its own.
+        """
+        for one, other in combinations(range(len(fit.terms)), 2):
+            for term in self._of_both(fit.terms[one], fit.terms[other]):
+                trial = self.equations.fit((*_without_both(fit, one, other), term))
+                if score(self.equations, trial) > score(self.equations, fit) and self.acceptable(trial):
+                    return self._merged(trial)
+        return fit
+
+    def _of_both(self, one: FleetTerm, other: FleetTerm) -> Iterator[FleetTerm]:
+        """Yield terms on the rovers of two, where these are one law on the same wheels, since the date of either."""
+        apart = set(one.units.rovers).isdisjoint(other.units.rovers)
+        if not apart or one.group != other.group or one.units.wheels != other.units.wheels:
+            return
+        for term in (one, other):
+            both = self.equations.on_rovers(term, tuple(sorted((*one.units.rovers, *other.units.rovers))))
+            yield from (replace(both, units=replace(both.units, each=each)) for each in (False, True))
 
     def showing(self, fit: FleetFit, index: int) -> tuple[int, ...]:
         """Return the rovers of a term that show it, each with a size of its own beside the other terms."""
@@ -277,6 +299,11 @@ def told_by_others(equations: FleetEquations, terms: Sequence[FleetTerm]) -> NDA
 def without(fit: FleetFit, index: int) -> tuple[FleetTerm, ...]:
     """Return all terms but one."""
     return (*fit.terms[:index], *fit.terms[index + 1 :])
+
+
+def _without_both(fit: FleetFit, one: int, other: int) -> tuple[FleetTerm, ...]:
+    """Return all terms but two."""
+    return tuple(term for index, term in enumerate(fit.terms) if index not in {one, other})
 
 
 def relative_size(

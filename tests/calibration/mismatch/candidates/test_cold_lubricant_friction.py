@@ -80,7 +80,7 @@ def test_drag_that_does_not_depend_on_temperature_is_not_cold(power: float) -> N
 
 
 @pytest.mark.parametrize(("seed", "pole_degC", "scale_K"), [(2, -30.0, 8.0), (3, -110.0, 15.0), (3, -30.0, 8.0)])
-def test_a_lubricant_of_another_pole_is_one_effect(seed: int, pole_degC: float, scale_K: float) -> None:  # noqa: N803
+def test_a_lubricant_of_another_pole_is_one_effect(seed: int, pole_degC: float, scale_K: float) -> None:
     """Where the pole was one of two, what it missed was named: coulomb or viscous friction of 2 to 3 %."""
 
     def vogel(columns: dict[str, Array]) -> Array:
