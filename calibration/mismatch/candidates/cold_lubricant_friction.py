@@ -30,6 +30,8 @@ POLES_DEGC = (-125.0, -95.0)
 BELOW_COLDEST_K = 15.0
 """How far below the coldest reading a pole that a recording asks for is at least [K] (a choice: an oil is solid some 20
 to 60 K above its pole). Poles colder than all others differ little from the coldest of them."""
+POLE_STD_K = 20.0
+"""Standard deviation of poles about these [K] (a choice: between these and that of mineral oils the mean is 20 K)."""
 SCALES_K = (6.0, 11.0, 20.0, 45.0)
 """Temperature changes for a factor e near the coldest reading, as searched [K] (a choice: in steps of about two)."""
 STEEPEST_K = 5.0
@@ -102,7 +104,13 @@ class ColdLubricantFriction(Candidate):
             f"the lubricant's drag changes {law}",
             lambda: np.array(problem.changes_within(self._growth(problem, shape))),
         )
-        return 0.0 if changes else UNLIKELY_SHAPE_PENALTY
+        return self._unlikely_pole(shape) + (0.0 if changes else UNLIKELY_SHAPE_PENALTY)
+
+    def _unlikely_pole(self, shape: Shape) -> float:
+        """Return the Δχ² by which a pole is less likely than usual ones."""
+        pole = float(shape.get("pole_degC", POLES_DEGC[0]))
+        beyond = max(pole - max(POLES_DEGC), min(POLES_DEGC) - pole, 0.0)
+        return (beyond / POLE_STD_K) ** 2
 
     def without_covariate(self, shape: Shape) -> Shape:
         """Return the same drag at any temperature, which would gain by its power of the speed alone."""
