@@ -83,7 +83,7 @@ def test_drag_that_does_not_depend_on_temperature_is_not_cold(power: float) -> N
     ("seed", "pole_degC", "scale_K", "noise"),
     [(3, -110.0, 15.0, 0.03), (1, -45.0, 10.0, 0.01), (2, -45.0, 10.0, 0.01), (4, -60.0, 12.0, 0.01)],
 )
-def test_a_lubricant_of_another_pole_is_one_effect(seed: int, pole_degC: float, scale_K: float, noise: float) -> None:  # noqa: N803
+def test_a_lubricant_of_another_pole_is_one_effect(seed: int, pole_degC: float, scale_K: float, noise: float) -> None:
     """Where the pole was one of two, viscous friction of 2 % was named beside the first one."""
 
     def vogel(columns: dict[str, Array]) -> Array:
