@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.late_columns import SENSOR_DELAY
 from regolithd.calibration.mismatch.fleet.choice.search import MOST_TERMS, TRIED, further, score
 from regolithd.calibration.mismatch.regression.residuals import active_size
+from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -216,12 +217,30 @@ class Chooser:
     def acceptable_term(self, fit: FleetFit, index: int) -> bool:
         """Return whether an effect has its signs, is large enough, and on each rover whose size is its own certain."""
         term, span = fit.terms[index], fit.spans[index]
+        if self._one_wheel_shows_alone(fit, index):
+            return False
         if term.units.each:
             if not self._certain(fit, index).all():
                 return False
         elif np.any(np.array(term.group.signs) * fit.coefficients[span].reshape(-1, len(term.group.columns)) < 0):
             return False
         return relative_size(self.equations, fit, index) >= THRESHOLDS.smallest_effect
+
+    def _one_wheel_shows_alone(self, fit: FleetFit, index: int) -> bool:
+        """Return whether a law of which each wheel has its own coefficients acts on one wheel of all that it is on.
+
+        As in one recording (`best_subsets`): on several it gains a little more by chance.
+        """
+        term, span, wheels = fit.terms[index], fit.spans[index], len(fit.terms[index].units.wheels)
+        if not term.group.of_wheels or wheels == 1 or "one" not in term.group.candidate.sharing:
+            return False
+        values, covariance = fit.coefficients[span], fit.covariance[span, span]
+        of_wheel = np.repeat([wheel for _, (wheel,) in term.parts], len(term.group.columns))
+        gains: list[float] = []  # of the coefficients of all wheels but one
+        for wheel in term.units.wheels:
+            rest = np.flatnonzero(of_wheel != wheel)
+            gains.append(float(values[rest] @ np.linalg.pinv(covariance[np.ix_(rest, rest)]) @ values[rest]))
+        return min(gains) < quantile(len(values) * (wheels - 1) // wheels, THRESHOLDS.single_test_level)
 
     def confirmed(self, fit: FleetFit) -> FleetFit:
         """Return the fit without effects that recordings which did not fit them do not confirm, the worst first."""
