@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import further
 from regolithd.calibration.mismatch.fleet.choice.selection import without
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.fleet.work.found import Found
     from regolithd.calibration.mismatch.problem.prior import Prior
 
+SPARED = 2
+"""Findings that a curve spares, from which names imitate it (a choice: one may be what an inexact law leaves)."""
 TRIED = 3
 """Curves that are tried, the best first (a choice: the best may be refused by other recordings)."""
 
@@ -31,7 +34,7 @@ def with_curves(chooser: Chooser, fit: FleetFit, found: Sequence[Found], priors:
 
     No curves where parameters that were stated wrongly explain as much of them as a law does that is a little wrong.
     """
-    told = _told(chooser, fit)
+    told = _told(chooser, fit, found)
     if not told.curves:
         return fit
     held, freed = chooser.equations, with_released(chooser.equations, fit, found, priors)
@@ -44,9 +47,9 @@ def with_curves(chooser: Chooser, fit: FleetFit, found: Sequence[Found], priors:
     return fit if stated_wrongly else told
 
 
-def _told(chooser: Chooser, fit: FleetFit) -> FleetFit:
+def _told(chooser: Chooser, fit: FleetFit, found: Sequence[Found]) -> FleetFit:
     against = max(_against(chooser, fit), key=chooser.evidence, default=fit)
-    fit = against if _is_ahead(chooser, against, fit) else fit
+    fit = against if _is_ahead(chooser, against, fit, found) else fit
     while (more := max(_beside(chooser, fit), key=chooser.evidence, default=fit)) is not fit:
         fit = more
     return fit
@@ -59,14 +62,23 @@ def _against(chooser: Chooser, fit: FleetFit) -> Iterator[FleetFit]:
             yield standing
 
 
-def _is_ahead(chooser: Chooser, curve: FleetFit, named: FleetFit) -> bool:
+def _is_ahead(chooser: Chooser, curve: FleetFit, named: FleetFit, found: Sequence[Found]) -> bool:
     """Return whether a fit with a curve is ahead of names by more than chance, and by more than their laws' misfit.
 
-    Laws that are a little wrong are behind a curve as well, where there are many readings.
+    Laws that are a little wrong are behind a curve as well, where there are many readings. But where a curve spares
+    several of them, with what single recordings show beside them, they only imitate it.
     """
+    if chooser.evidence(curve) - chooser.evidence(named) <= THRESHOLDS.smooth_term_entry:
+        return False
     misfit = (curve.delta_chi2 - named.delta_chi2) / max(curve.delta_chi2, 1e-9)
-    ahead = chooser.evidence(curve) - chooser.evidence(named)
-    return misfit > THRESHOLDS.form_misfit and ahead > THRESHOLDS.smooth_term_entry
+    spared = _findings(chooser, named, found) - _findings(chooser, curve, found)
+    return misfit > THRESHOLDS.form_misfit or spared >= SPARED
+
+
+def _findings(chooser: Chooser, fit: FleetFit, found: Sequence[Found]) -> int:
+    """Return how many findings an answer has, with those of single recordings."""
+    shown = shown_beside(chooser.equations, fit, found)
+    return len(fit.terms) + len(shown.effects) + len(shown.unexplained)
 
 
 def _beside(chooser: Chooser, fit: FleetFit) -> Iterator[FleetFit]:

@@ -229,6 +229,17 @@ def test_a_ripple_that_no_recording_shows_is_found_in_all_together() -> None:
     assert alone == pytest.approx([0.02] * 12, abs=0.03)
 
 
+def test_a_ripple_of_one_joint_is_told_on_it_alone() -> None:
+    """Both would gain a little more by chance: each wheel has two coefficients of its own in each rover."""
+    recordings = [fleet_arm.columns(n) for n in range(6)]
+    for n, rippled in enumerate(fleet_arm.columns(n, ripple=0.05) for n in range(6)):
+        first = rippled["axis"] == fleet_arm.JOINTS[0]
+        recordings[n] = {name: np.where(first, values, recordings[n][name]) for name, values in rippled.items()}
+    (effect,) = compare(recordings, fleet_arm.ArmWithAngle()).answer.effects
+    assert (effect.name, effect.wheels) == ("wheel-angle-ripple", fleet_arm.JOINTS[:1])
+    assert effect.parameters["amplitude"].low < 0.05 < effect.parameters["amplitude"].high
+
+
 def test_a_ripple_that_recordings_show_is_the_fleet_s() -> None:
     """Although its order was found to be another in each, to within the width of a line."""
     found = compare([fleet_arm.columns(n, ripple=0.1) for n in range(3)], fleet_arm.ArmWithAngle())

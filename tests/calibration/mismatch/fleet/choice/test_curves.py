@@ -21,8 +21,10 @@ from synthetic_fleet import (
     term,
 )
 
+from regolithd.calibration.mismatch.fleet.choice import curves
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.curves import with_curves
+from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
 from regolithd.calibration.mismatch.fleet.choice.search import further, places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.work.found import Found
@@ -31,6 +33,7 @@ from regolithd.calibration.mismatch.problem.prior import Prior
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
     from regolithd.calibration.mismatch.fleet.choice.terms import FleetFit
 
 ROVER = (0, 1) * 4
@@ -97,6 +100,26 @@ def test_a_name_that_imitates_a_curve_goes() -> None:
     names, found = chosen(imitated)
     assert [each.name for each in names.terms] == ["steady-drag"]
     assert found.terms == (term(CURVE, Course("always"), (0, 1)),)
+
+
+@pytest.mark.parametrize(("alone", "named"), [(0, True), (1, True), (2, False)])
+def test_a_law_that_is_a_little_wrong_keeps_its_name(alone: int, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A curve explains a twelfth more; but two findings of single recordings beside the law are too many."""
+
+    def shown(_: FleetEquations, fit: FleetFit, __: Sequence[Found]) -> Shown:
+        findings = () if fit.curves else tuple((n, FINDINGS.effects[0]) for n in range(alone))
+        return Shown(findings, (), (), ())
+
+    imitated = []
+    for seed, each in enumerate(drives([{}] * 8)):
+        columns, own = each.columns.copy(), np.random.default_rng(seed + 50).normal(size=each.residual.shape)
+        knots = sum(columns[COLUMNS + knot] for knot in range(KNOTS))
+        columns[1] = np.sqrt(0.92 / KNOTS) * knots + np.sqrt(0.08) * own
+        imitated.append(Drive(columns, each.residual + 0.06 * knots))
+    monkeypatch.setattr(curves, "shown_beside", shown)
+    names, found = chosen(imitated)
+    assert names.terms == (term(DRAG, Course("always"), (0, 1)),)
+    assert found.terms == (names.terms if named else (term(CURVE, Course("always"), (0, 1)),))
 
 
 def test_a_parameter_that_was_stated_wrongly_is_no_curve() -> None:

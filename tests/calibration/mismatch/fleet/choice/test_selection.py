@@ -114,6 +114,13 @@ def three_drags(drives: Sequence[Drive]) -> FleetEquations:
     return of
 
 
+def test_a_change_of_two_rovers_of_three_is_one_effect() -> None:
+    """One of them has a single recording since, which no other could confirm; of three rovers no pairs are searched."""
+    worn = {n: {(2, 1): 0.3} for n in (11, 12, 14)}
+    of = equations_of([drive(200 + n, worn.get(n)) for n in range(15)], (0, 1, 2) * 5)
+    assert told(chooser(of).chosen().terms) == [("wear", "one", (0, 2), (1,), "since", 11)]
+
+
 def test_of_different_laws_on_two_rovers_none_is_on_both() -> None:
     """A third law that is a little of both gains most over all of the fleet."""
     drives = [drive(100 + n, on_both(2, 0.2 - 0.06 * (n % 2)) | on_both(3, 0.2 * (n % 2))) for n in range(10)]
