@@ -103,7 +103,7 @@ class FleetEquations:
         return tuple(int(i) for i in at[np.argsort(self.when[at], kind="stable")])
 
     def on_rovers(self, term: FleetTerm, rovers: tuple[int, ...]) -> FleetTerm:
-        """Return a term on these of its rovers alone."""
+        """Return a term on these rovers."""
         course = term.course.among(self.of_rovers(rovers), self.when)
         return replace(term, units=replace(term.units, rovers=rovers), course=course)
 

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 SLOPE_STEP = 1e-4
 """Step of a coefficient for the slope of the size, as a share of the largest (double precision)."""
 LEAST_WEIGHT = 1e-300
-"""Weight of what nothing tells: where it is all that there is, its mean is still one."""
+"""Sum of the weights of coefficients that nothing tells, so that their mean is 0."""
 ANY = (-np.inf, np.inf)
 """Bounds of what may have any value."""
 
@@ -51,12 +51,15 @@ def rms(squares: Array, counts: Array) -> float:
 def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
     """Return an effect's `count` coefficients with standard deviations; of a size of each rover's, mean and spread.
 
-    A coefficient that nothing tells has a standard deviation of 0, and no weight.
+    A coefficient that nothing tells is 0 with a standard deviation of 0, and is left out.
     """
     values, stds = values.reshape(-1, count), stds.reshape(-1, count)
-    weights = np.divide(1.0, stds**2, out=np.full(stds.shape, LEAST_WEIGHT), where=stds > 0)
-    mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
-    return mean, _as_a_whole(mean, np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0)))
+    told = stds > 0
+    weights = np.divide(1.0, stds**2, out=np.zeros(stds.shape), where=told)
+    total = np.maximum(np.sum(weights, axis=0), LEAST_WEIGHT)
+    mean = np.sum(weights * values, axis=0) / total
+    spread = np.sqrt(np.sum((values - mean) ** 2, axis=0, where=told) / np.maximum(told.sum(axis=0), 1))
+    return mean, _as_a_whole(mean, np.where(told.any(axis=0), np.maximum(1 / np.sqrt(total), spread), 0.0))
 
 
 def _as_a_whole(sizes: Array, stds: Array) -> Array:

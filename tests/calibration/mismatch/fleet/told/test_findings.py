@@ -169,6 +169,13 @@ def test_what_is_told_of_the_fit_is_on_recordings_that_did_not_fit_it(season: Ch
     assert nothing.held_out_rmse_after == pytest.approx(nothing.noise_floor_rmse, rel=0.05)
 
 
+def test_a_noise_floor_is_no_higher_than_what_is_left(season: Chosen) -> None:
+    """Where recordings alone show nothing of what all together show, each of them leaves more than all together."""
+    found = tuple(replace(each, noise_floor=10 * each.noise_floor) for each in season.found)
+    fit = answer_of_fleet(replace(season, found=found)).fit
+    assert 0.9 * fit.held_out_rmse_after < fit.noise_floor_rmse < fit.held_out_rmse_after
+
+
 def test_whose_parameter_left_its_prior_and_since_when_is_in_the_catalogue() -> None:
     """With its value in each recording of that rover alone, and whether that excludes the stated value."""
     shifted = {(0, 0): 1.6, (0, 1): 1.6}

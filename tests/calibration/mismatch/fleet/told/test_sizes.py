@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
 from regolithd.calibration.mismatch.fleet.choice.selection import relative_size
-from regolithd.calibration.mismatch.fleet.told.sizes import moved_law, parameters_of, size_with_std
+from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, moved_law, parameters_of, size_with_std
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -133,3 +133,12 @@ def test_a_size_of_each_rover_s_scatters_as_they_do() -> None:
     fit = of.fit((replace(both, units=replace(both.units, each=True)),))
     size, std = size_with_std(of, of, fit, 0)
     assert std / size == pytest.approx(1 / 3, abs=0.05)
+
+
+def test_a_coefficient_that_nothing_tells_has_no_weight() -> None:
+    """A rover in whose recordings a law's column is 0 has neither a size nor a standard deviation."""
+    with np.errstate(all="raise"):
+        found = mean_sizes(np.array([1.0, 0.0, 1.2]), np.array([0.1, 0.0, 0.1]), 1)
+        nothing = mean_sizes(np.zeros(2), np.zeros(2), 1)
+    np.testing.assert_allclose(found, mean_sizes(np.array([1.0, 1.2]), np.array([0.1, 0.1]), 1))
+    np.testing.assert_array_equal(nothing, 0.0)
