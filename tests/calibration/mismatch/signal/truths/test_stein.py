@@ -52,8 +52,9 @@ def test_only_clear_gains_are_gains() -> None:
     assert not clearly_better(READINGS, VARIANCE, shrunk(1.0), shrunk(2 / 3), fitted=0)
     assert not clearly_better(READINGS, VARIANCE, shrunk(2 / 3), shrunk(0.66), fitted=0)
     assert not clearly_better(READINGS, VARIANCE, shrunk(2 / 3), shrunk(1.0), fitted=COUNT)
-    few = [Estimate(each.mean[:199], each.variance[:199]) for each in (shrunk(2 / 3), shrunk(1.0))]
-    assert not clearly_better(READINGS[:199], VARIANCE, *few, fitted=0)
+    for count in (99, 100):
+        few = [Estimate(each.mean[:count], each.variance[:count]) for each in (shrunk(2 / 3), shrunk(1.0))]
+        assert clearly_better(READINGS[:count], VARIANCE, *few, fitted=0) == (count == 100)
 
 
 def test_an_error_that_is_stated_too_large_shows() -> None:
