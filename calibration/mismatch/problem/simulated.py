@@ -134,8 +134,8 @@ def inputs_of(
     stated = {name: prior.value for name, prior in simulation.parameters.items()}
     values = {**simulation.variants(), **stated}
 
-    def predict(prepared: Recording) -> Array:
-        return simulation.predict(complete_inputs(prepared), values)
+    def predict(prepared: Recording, /, **moved: float) -> Array:
+        return simulation.predict(complete_inputs(prepared), {**values, **moved})
 
     recording = without_input_faults(
         recording, simulation.channel, lambda faulty: predict(_prepared(faulty, simulation)[0]), thresholds
@@ -174,7 +174,7 @@ def inputs_of(
         simulation,
         lambda other: predict(_prepared(other, simulation)[0]),
         predicted,
-        lambda name, value: simulation.predict(complete_inputs(as_read), {**values, name: value}),
+        lambda name, value: predict(as_read, **{name: value}),
     )
     expected = expected.with_notes(*in_units)
     carries = _carries_over_gaps(as_read, simulation, values, predicted)

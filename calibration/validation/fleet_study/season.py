@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,7 +39,6 @@ START = datetime(2026, 1, 5, 9, 0, tzinfo=UTC)
 DAYS = 200.0
 """Length of the season."""
 STEP_S = 0.2
-Pair = tuple[TrueModel, TrueModel]
 
 
 @dataclass(frozen=True)
@@ -120,34 +120,36 @@ def season_tables(seed: int) -> Tables:
 
 def trial_of(seed: int, number: int, drive: Drive, duration_s: float) -> Trial:
     """Return one drive as measured. A rover keeps its parameters and its effect's law; way and noise are new."""
-    tables, place = season_tables(seed), list(ROVERS).index(drive.rover)
-
-    def on_a_way(rng: Generator) -> TrueModel:
-        traverse = rover_traverse(rng, "patrol", tables, duration_s, STEP_S)
-        return true_model(np.random.default_rng([seed, 1, place]), tables, traverse)
-
     rng, concealed = np.random.default_rng([seed, 2, number]), ROVERS[drive.rover]
-    model, effects = on_a_way(rng), tuple[ConcealedEffect, ...]()
+    model, effects = _on_a_way(seed, drive.rover, rng, duration_s), tuple[ConcealedEffect, ...]()
     if concealed is not None and drive.size:
-        typical = on_a_way(np.random.default_rng([seed, 4, place]))
-        effects = (_effect(seed, place, concealed, (typical, model), drive.size),)
-    return with_noise(rng, Plan(number, seed, "fleet", ()), model, tables, effects)
+        size = drive.size * _full_size(seed, drive.rover, concealed, duration_s)
+        law = _law(seed, drive.rover, concealed, model)
+        effects = (replace(law, size=size, strength=relative_strength(model, law, size)),)
+    return with_noise(rng, Plan(number, seed, "fleet", ()), model, season_tables(seed), effects)
 
 
-def _effect(seed: int, place: int, concealed: Concealed, models: Pair, size: float) -> ConcealedEffect:
-    """Return the effect at its size on a drive, on its wheels alone.
+def _on_a_way(seed: int, rover: str, way: Generator, duration_s: float) -> TrueModel:
+    """Return a rover's true model on a way of its own."""
+    tables = season_tables(seed)
+    traverse = rover_traverse(way, "patrol", tables, duration_s, STEP_S)
+    return true_model(np.random.default_rng([seed, 1, list(ROVERS).index(rover)]), tables, traverse)
 
-    Its full size has the stated strength on a typical drive of the rover, the first of the two models, and is the same
-    on all others: a coefficient does not depend on how cold a day is.
+
+@cache
+def _full_size(seed: int, rover: str, concealed: Concealed, duration_s: float) -> float:
+    """Return the size at which a rover's law has the stated strength on a typical drive.
+
+    It is the same on all drives: a coefficient does not depend on how cold a day is.
     """
-    typical, there = (_law(seed, place, concealed, model) for model in models)
-    full = of_strength(models[0], typical, concealed.strength * (len(concealed.wheels) / 6) ** 0.5).size
-    return replace(there, size=size * full, strength=relative_strength(models[1], there, size * full))
+    typical = _on_a_way(seed, rover, np.random.default_rng([seed, 4, list(ROVERS).index(rover)]), duration_s)
+    strength = concealed.strength * (len(concealed.wheels) / 6) ** 0.5
+    return of_strength(typical, _law(seed, rover, concealed, typical), strength).size
 
 
-def _law(seed: int, place: int, concealed: Concealed, model: TrueModel) -> ConcealedEffect:
+def _law(seed: int, rover: str, concealed: Concealed, model: TrueModel) -> ConcealedEffect:
     """Return a rover's law on a drive, of no size yet."""
-    law = LIBRARY_EFFECTS[concealed.law](np.random.default_rng([seed, 3, place]), model)
+    law = LIBRARY_EFFECTS[concealed.law](np.random.default_rng([seed, 3, list(ROVERS).index(rover)]), model)
     if len(concealed.wheels) == 1:
         on = on_wheels(concealed.wheels)
         law = replace(law, added_current_A=lambda at: at * model.traverse.rotation * on)

@@ -71,8 +71,9 @@ def _is_ahead(chooser: Chooser, curve: FleetFit, named: FleetFit, found: Sequenc
     if chooser.evidence(curve) - chooser.evidence(named) <= THRESHOLDS.smooth_term_entry:
         return False
     misfit = (curve.delta_chi2 - named.delta_chi2) / max(curve.delta_chi2, 1e-9)
-    spared = _findings(chooser, named, found) - _findings(chooser, curve, found)
-    return misfit > THRESHOLDS.form_misfit or spared >= SPARED
+    if misfit > THRESHOLDS.form_misfit:
+        return True
+    return _findings(chooser, named, found) - _findings(chooser, curve, found) >= SPARED
 
 
 def _findings(chooser: Chooser, fit: FleetFit, found: Sequence[Found]) -> int:

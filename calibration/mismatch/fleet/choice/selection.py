@@ -154,7 +154,7 @@ class Chooser:
         """
         for one, other in combinations(range(len(fit.terms)), 2):
             for term in self._of_both(fit.terms[one], fit.terms[other]):
-                trial = self.equations.fit((*_without_both(fit, one, other), term))
+                trial = self.equations.fit((*without(fit, one, other), term))
                 if score(self.equations, trial) > score(self.equations, fit) and self.acceptable(trial):
                     return self._merged(trial)
         return fit
@@ -315,14 +315,9 @@ def told_by_others(equations: FleetEquations, terms: Sequence[FleetTerm]) -> NDA
     return found
 
 
-def without(fit: FleetFit, index: int) -> tuple[FleetTerm, ...]:
-    """Return all terms but one."""
-    return (*fit.terms[:index], *fit.terms[index + 1 :])
-
-
-def _without_both(fit: FleetFit, one: int, other: int) -> tuple[FleetTerm, ...]:
-    """Return all terms but two."""
-    return tuple(term for index, term in enumerate(fit.terms) if index not in {one, other})
+def without(fit: FleetFit, *indices: int) -> tuple[FleetTerm, ...]:
+    """Return all terms but these."""
+    return tuple(term for index, term in enumerate(fit.terms) if index not in indices)
 
 
 def relative_size(

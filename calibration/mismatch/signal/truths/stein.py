@@ -41,6 +41,7 @@ choice: noise that is half as large again as stated leaves 2.25, a step of two e
 FEWEST_BATCHES = 4
 """Batches below which nothing is judged."""
 FEWEST_READINGS = FEWEST_BATCHES * SHORTEST_BATCH
+"""Readings that these are."""
 
 
 @dataclass(frozen=True, eq=False)
